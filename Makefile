@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # Fluxproof. Every target that needs tools sets them up first (scripts/setup.sh);
 # when everything is there already, that is a comparison of hashes.
 #
@@ -103,8 +104,9 @@ synth: setup ## count cells for three Xilinx families, longest paths and DSP reg
 ecp5: setup ## route on ECP5 by stock tools, three seeds: the clock rate, some minutes
 	$(PYTHON_RUN) -m scripts.synth --only ecp5 $(ARGS)
 
-lint: setup ## check the style of the Python (ruff) and, with a vsg.yaml, of the VHDL (vsg)
+lint: setup ## check the style of the Python (ruff), its types (pyright) and the style of the VHDL (vsg)
 	.venv/bin/ruff check .
+	PYRIGHT_PYTHON_IGNORE_WARNINGS=1 .venv/bin/pyright
 	$(if $(wildcard vsg.yaml),.venv/bin/vsg -c vsg.yaml -f $$(find rtl tb -name '*.vhd' ! -name fluxproof_pkg.vhd | sort))
 
 lock: ## renew requirements.lock and requirements/ from pyproject.toml (newest versions that fit; ARGS=--keep: the same ones)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # Run by Vivado's block design for each fluxproof_axi in it: CLOCK_HZ is the rate of the clock that is connected, so
 # that software, which reads it back, cannot be told another one.
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What all tests share: figures of a study, which `make board` collects; all tests before any is deselected."""
 
 import json

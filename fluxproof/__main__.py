@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The command ``fluxproof``, also as ``python -m fluxproof``."""
 
 import sys

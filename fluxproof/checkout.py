@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Folders of a checkout, for building, checking and studying the core; absent in an installed package."""
 
 from __future__ import annotations

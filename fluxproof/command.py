@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The command ``fluxproof`` with the subcommands listed in COMMANDS, e.g. ``fluxproof registers drive.toml``.
 
 Exit status: 0 done, 1 if a command found a fault, 2 bad input, a full disk or a defect of the tool (one line on stderr

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """``fluxproof dump``: converts the telemetry words stored by a DMA to a dump for ``fluxproof diagnose``.
 
 The registers are those of drive.toml, or of a JSON file if the core ran with others: ``{"kp_d": 1234, ...}`` with

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Writing results: to a temporary name first, then renamed, so that no file is incomplete.
 
 Several files of one result enter their folder together with fluxproof.stage.

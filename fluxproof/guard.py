@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What surrounds every command: one line and an exit status for any error and any signal, never a traceback.
 
 FLUXPROOF_DEBUG=1 shows the traceback, and the warnings of libraries.  Imports are made inside the functions, as Ctrl-C
@@ -64,7 +65,7 @@ def _prepare(ctrl_c: CtrlC) -> None:
         signal.signal(signal.SIGINT, ctrl_c)
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed by the caller
-            setattr(sys, name, open(os.devnull, "w"))
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115 it stays open
         getattr(sys, name).reconfigure(errors="backslashreplace")  # file names need not be text
     if debugging():
         return
@@ -113,7 +114,7 @@ def _told(text: str, status: int) -> int:
     from fluxproof.quote import printable
 
     clear = "\r\x1b[K" if sys.stderr.isatty() else ""  # a line of progress may be there
-    try:
+    try:  # noqa: SIM105 contextlib would be one more import, in which Ctrl-C may come
         print(f"{clear}fluxproof: {printable(text, sys.stderr.encoding)}", file=sys.stderr, flush=True)
     except OSError:  # nobody can be told
         pass
@@ -154,7 +155,7 @@ def _full_output() -> str:
 
 def _discard_output() -> None:
     """What is still to be written to standard output goes nowhere: Python would try again at its end."""
-    try:
+    try:  # noqa: SIM105
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (OSError, ValueError):  # no file
         pass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """``fluxproof registers``: each register in SI units, as integer, and the SI value of the integer.
 
 With ``--format c`` or ``json`` the same integers as a list of (address, value) for a driver to load.

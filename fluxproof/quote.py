@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 r"""Text from a user or a file, written into another language: one function for each language and position.
 
 Each makes text that the language reads back as the same string, or raises DriveError with the character that it cannot
@@ -50,8 +51,8 @@ def printable(text: str, encoding: str | None) -> str:
 
 def say(text: str, stream: TextIO | None = None) -> None:
     """Print one line at once, on stdout or on ``stream``."""
-    stream = stream or sys.stdout
-    print(printable(text, stream.encoding), file=stream, flush=True)
+    out = sys.stdout if stream is None else stream
+    print(printable(text, out.encoding), file=out, flush=True)
 
 
 def tcl_word(text: str) -> str:

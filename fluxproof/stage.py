@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Results of several files enter their folder together or not at all.
 
     with together(out, ("report.html", "drive_improved.toml")) as stage:

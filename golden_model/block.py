@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The declaration of a block: ports with formats, registers, latency, model, reference, error bounds.
 
 The contract of every block, in the model and in the RTL:

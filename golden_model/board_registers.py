@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The registers and generics of fluxproof_board from drive.toml: what its front ends need beside the core's registers.
 
 One function for the Python bus, `fluxproof registers`, the C header of `fluxproof project` and the commissioning.
@@ -14,7 +15,7 @@ import math
 
 from golden_model.converters import sinc3, sinc_overcurrent
 from golden_model.drive import Drive
-from golden_model.drive_keys import DriveError
+from golden_model.drive_keys import DriveError, needed
 from golden_model.encoders import edge_timer, position_bridge, turn_counter
 from golden_model.front_ends import frame_s
 from golden_model.io import board_map, speed
@@ -117,7 +118,7 @@ def _encoder(drive: Drive) -> dict:
     """{register: (value, key)} of the encoder's kind."""
     kind = drive.encoder.kind
     if kind == "abz":
-        return _edges(drive, drive.encoder.counts) | _incremental(drive)
+        return _edges(drive, needed(drive.encoder.counts)) | _incremental(drive)
     if kind == "hall":
         return _edges(drive, SECTORS * drive.machine.pole_pairs)
     return {} if kind == "code" else _serial(drive)
@@ -138,9 +139,9 @@ def _edges(drive: Drive, counts: int) -> dict:
 
 def _incremental(drive: Drive) -> dict:
     """Counts to codes, and the index."""
-    e = drive.encoder
-    correct = max(2, int(CORRECTED * e.counts / drive.machine.pole_pairs))
-    found = {n: (v, "[encoder] counts") for n, v in turn_counter.setting(e.counts, drive.sensors.position_bits).items()}
+    e, counts = drive.encoder, needed(drive.encoder.counts)
+    correct = max(2, int(CORRECTED * counts / drive.machine.pole_pairs))
+    found = {n: (v, "[encoder] counts") for n, v in turn_counter.setting(counts, drive.sensors.position_bits).items()}
     found["correct_max"] = (correct, "[encoder] counts, [machine] pole_pairs")
     found["index_phase"] = (e.index_phase or 0, "[encoder] index_phase")
     return found
@@ -148,14 +149,14 @@ def _incremental(drive: Drive) -> dict:
 
 def _serial(drive: Drive) -> dict:
     """Frame, its check, and the time from the encoder's latch to the sampling instant."""
-    e, clock = drive.encoder, drive.core.clock_hz
+    e, clock, bits = drive.encoder, drive.core.clock_hz, needed(drive.encoder.bits)
     check = int(e.crc is not False)
-    half = _up(0.5 / e.clock_hz, drive) - 1
+    half = _up(0.5 / needed(e.clock_hz), drive) - 1
     period = 2 * (half + 1)
     found = {
         "half_period": (half, "[encoder] clock_hz, [core] clock_hz"),
-        "encoder_bits": (e.bits + e.turns_bits, "[encoder] bits, turns_bits"),
-        "turn_bits": (e.bits, "[encoder] bits"),
+        "encoder_bits": (bits + e.turns_bits, "[encoder] bits, turns_bits"),
+        "turn_bits": (bits, "[encoder] bits"),
         "bridge_max": (e.bridge_samples, "[encoder] bridge_samples"),
     }
     if e.kind == "ssi":
@@ -187,11 +188,11 @@ def codes_s(drive: Drive) -> float:
     """From the trigger to the converters' codes [s]."""
     c, clock = drive.converters, drive.core.clock_hz
     if c.kind == "spi":
-        return (c.conversion_s or 0.0) + (spi_bits(drive) * (2 if c.two_words else 1) + 3) / c.clock_hz
+        return (c.conversion_s or 0.0) + (spi_bits(drive) * (2 if c.two_words else 1) + 3) / needed(c.clock_hz)
     if c.kind == "xadc":
         return _conversions(drive) * XADC_CONVERSION_S + XADC_READS / clock
     if c.kind == "delta_sigma":
-        return 1.5 * c.oversampling / c.clock_hz
+        return 1.5 * needed(c.oversampling) / needed(c.clock_hz)
     return 0.0
 
 
@@ -215,7 +216,7 @@ def _channels(drive: Drive, order: list[int]) -> dict:
 
 def _spi(drive: Drive) -> dict:
     c, clock = drive.converters, drive.core.clock_hz
-    ratio = round(clock / c.clock_hz)
+    ratio = round(clock / needed(c.clock_hz))
     started = c.conversion_s is not None
     mode = c.mode if c.mode is not None else 0 if started else 2
     wait = _up(c.conversion_s or 0.0, drive) + TO_BUSY
@@ -258,22 +259,22 @@ def _xadc(drive: Drive) -> dict:
 
 
 def _delta_sigma(drive: Drive) -> dict:
-    c, clock = drive.converters, drive.core.clock_hz
-    ratio = round(clock / c.clock_hz)
+    c, clock, oversampling = drive.converters, drive.core.clock_hz, needed(drive.converters.oversampling)
+    ratio = round(clock / needed(c.clock_hz))
     delay = min(_up(c.round_trip_s, drive), ratio - 1)
     key = "[converters] clock_hz, oversampling; [core] clock_hz"
     try:
         # From the middle of a bit's time to its strobe: half a bit, the round trip, two registers
         late = ratio / 2 + delay + 2
-        start = sinc3.centred(round(drive.sample_time_s * clock), c.oversampling, ratio, late)
+        start = sinc3.centred(round(drive.sample_time_s * clock), oversampling, ratio, late)
     except ValueError as error:
         raise DriveError(f"register start_clocks from {key}: {error}") from None
     high, low = over_limits(drive)
     return {
         "mod_ratio": (ratio, key),
         "mod_delay": (delay, "[converters] round_trip_s, [core] clock_hz"),
-        "oversampling": (c.oversampling, "[converters] oversampling"),
-        "sinc_gain": (sinc3.gain_of(c.oversampling), "[converters] oversampling"),
+        "oversampling": (oversampling, "[converters] oversampling"),
+        "sinc_gain": (sinc3.gain_of(oversampling), "[converters] oversampling"),
         "start_clocks": (start, key),
         "trip_oversampling": (OVER_BITS, key),
         "limit_high": (high, "[protection] current_trip_a, [sensors] current_range_a"),

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The part of the core that runs at every clock, wired as in rtl/fluxproof.vhd and rtl/io/protection.vhd.
 
 Sample guard, host watch, fault latch, gates and the pin of the brake resistor.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A drive in SI units, as drive.toml describes it once, and the bases of the per-unit numbers.
 
 Peak values throughout, amplitude-invariant dq frames, angles and speeds electrical unless a name says

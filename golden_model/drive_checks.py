@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Checks across the sections of a drive: settings that are valid alone but contradict each other."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Reads a TOML file into the dataclasses that declare its sections; every error is a message of one line.
 
 A message names the file, the section and the key, and what is allowed: the range, the type, or for an
@@ -8,12 +9,13 @@ import codecs
 import dataclasses
 import difflib
 import re
+import sys
 from pathlib import Path
 
-try:
+if sys.version_info >= (3, 11):
     import tomllib
-except ModuleNotFoundError:  # Python 3.10
-    import tomli as tomllib
+else:
+    import tomli as tomllib  # pyright: ignore[reportMissingImports]  # installed with Python 3.10 alone
 
 from golden_model.drive_keys import DriveError, key_of
 from golden_model.regular_file import read_regular

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """How a key of drive.toml is declared: type, unit and allowed range, written once at the dataclass field.
 
 A section of the file is a frozen dataclass whose fields are made with the functions below; drive_file
@@ -7,6 +8,9 @@ reads any such dataclass and writes the error messages, so that a new key is one
 import dataclasses
 import math
 from dataclasses import MISSING, dataclass
+from typing import TypeVar
+
+T = TypeVar("T")
 
 # Unit: (least of a positive value, largest magnitude).  From a vibration motor of 1 g (mA, mohm to kohm, 1e-10 kg m2)
 # and a telescope that turns once a day to a generator of 50 MW (100 kA, 30 kV, 1e7 kg m2), with two or three decades to
@@ -107,6 +111,13 @@ def flag(doc, default=MISSING):
 def choice(words, doc, default=MISSING):
     """One of several words."""
     return _field(Key("word", doc=doc, words=words), default)
+
+
+def needed(value: T | None) -> T:
+    """The value of a key that the kind of its section needs, which drive_checks has required."""
+    if value is None:
+        raise DriveError("a key is missing that its section needs")
+    return value
 
 
 def is_finite(value):

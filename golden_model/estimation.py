@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The estimators beside the control: twin of ``estimation`` in rtl/fluxproof.vhd, which ESTIMATORS = 0 leaves out.
 
 ``for_control`` gives what the control takes from the estimates of the sample before, ``step`` the new estimates.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Fixed-point formats and the two narrowing operations; twin of rtl/common/fixed_pkg.vhd.
 
 A value is an integer; its format gives the meaning of the integer.  Python integers are unbounded

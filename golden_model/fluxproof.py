@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The whole core, one sample at a time: twin of rtl/fluxproof.vhd.
 
 Raw sample -> conditioning -> transforms -> control -> modulation -> compare values.  What runs

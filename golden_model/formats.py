@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Formats and constants that several blocks share.  Everything is per unit of the bases in drive.py.
 
 ``PU`` has 18 bits, the narrow port of every FPGA multiplier of the last twenty years, and a range

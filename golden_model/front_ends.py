@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """[encoder] and [converters] of drive.toml, both optional: what the board puts between its pins and the core.
 
 The front ends of docs/board.md are set from these keys; without a section the core gets ready-made codes.

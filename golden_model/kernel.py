@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """``@kernel``: a function that runs as plain Python and, compiled by numba, a thousand times faster.
 
 The compiled code is cached on disk.  numba notices a change of the kernel's own file but
@@ -11,11 +12,26 @@ import hashlib
 import os
 import stat
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, ParamSpec, Protocol, TypeVar
 
 import numba
+from numba.core import config
 
 PACKAGE = Path(__file__).resolve().parent
+SETTINGS: Any = config  # numba makes its attributes at run time
+P = ParamSpec("P")
+R_co = TypeVar("R_co", covariant=True)
+
+
+class Kernel(Protocol[P, R_co]):
+    """A compiled function; ``py_func`` is the same as plain Python."""
+
+    @property
+    def py_func(self) -> Callable[P, R_co]: ...
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R_co: ...
 
 
 def _source_hash() -> str:
@@ -56,15 +72,16 @@ def _user() -> int:
 CACHE_DIR = _cache_root() / "numba" / _source_hash()
 
 
-def kernel(function, cache_dir: Path = CACHE_DIR):
+def kernel(function: Callable[P, R_co], cache_dir: Path = CACHE_DIR) -> Kernel[P, R_co]:
     """Compile ``function`` with numba on first call; ``function.py_func`` stays plain Python.
 
     A kernel outside this package that calls code outside this package needs a ``cache_dir`` of its own,
     named after a hash of everything it calls.
     """
-    previous = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(cache_dir)
+    previous = SETTINGS.CACHE_DIR
+    SETTINGS.CACHE_DIR = str(cache_dir)
     try:
-        return numba.njit(cache=True)(function)
+        compiled: Any = numba.njit(cache=True)(function)
+        return compiled
     finally:
-        numba.config.CACHE_DIR = previous
+        SETTINGS.CACHE_DIR = previous

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The registers of the protection, as golden_model/scaling.py does for the others.
 
 The default limits lie outside the range of a healthy drive: overcurrent at twice the current limit, the

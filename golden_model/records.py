@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The records at the core's ports: declared here once, written into fluxproof_pkg.vhd by `make generate`.
 
 * sample_t: what a sample brings: the fields of fluxproof.Sample but ``run``, which the core knows itself.
@@ -21,7 +22,7 @@ WIDEST = {"ADC_BITS": 16, "POSITION_BITS": 18}
 ENTERS_AS = {name.removesuffix("_in"): name for name in sample_latch.NAMES if name != "run_in"}
 _OBSERVED, _ESTIMATED = fluxproof.OBSERVED, estimation.Estimated._fields
 _LATCHED = {p.name: p for p in sample_latch.BLOCK.ports(WIDEST)}
-_NAMED = {fmt: f"{name}_W - 1" for name, fmt in reversed(vars(formats).items()) if isinstance(fmt, Format)}
+_NAMED = {fmt: f"{name}_W - 1" for name, fmt in reversed(list(vars(formats).items())) if isinstance(fmt, Format)}
 
 RECORDS: dict[str, dict[str, Port]] = {
     "sample_t": {field: replace(_LATCHED[name], name=field) for field, name in ENTERS_AS.items()},

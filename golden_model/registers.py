@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Converts a drive in SI units to the integers of the core's registers: docs/drives/*.toml -> Registers, Config.
 
 ``integer = SI value / scale / LSB``, rounded half up; scaling.py gives the value and scale of each register.

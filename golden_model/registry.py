@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Every block of the core, one line each: add yours here and the bench finds it."""
 
 from golden_model.common import input_filter, multiply_add, packet_fifo, reciprocal, sqrt, sum_of_products

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Opens regular files only: a FIFO or a device of a stranger would block the reader, or never end."""
 
 import errno

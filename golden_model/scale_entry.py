@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What every part of the scaling yields: the value of one register with its unit, its scale and where it comes from."""
 
 from typing import NamedTuple

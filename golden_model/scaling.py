@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The SI value of each register, and its scale: the SI value of 1.0 in the format of the register.
 
 A scale is a product of the bases I, U, w (electrical speed), U/w (flux linkage) and the sample time T_s;

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Refuses a TOML text whose keys have too many parts: the parser's time grows with the square of their number."""
 
 import re

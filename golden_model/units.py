@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Integers of the core's signals to SI units and back; ``UNITS`` gives the unit of each signal.
 
 The scale of a signal is the value of its LSB: format LSB times base.  Compare values count clocks.
@@ -94,7 +95,8 @@ def to_si(name, value, drive):
 
 def from_si(name, value, drive):
     """Nearest integer for a value in SI units; angles wrap, anything else out of range is a ValueError."""
-    port, lsb = SIGNALS.get(name), si_per_lsb(name, drive)
+    lsb = si_per_lsb(name, drive)
+    port = SIGNALS[name]
     if not math.isfinite(value):
         raise ValueError(f"{name} = {value} is not a finite number")
     integer = math.floor(value / lsb + 0.5)

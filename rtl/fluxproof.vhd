@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the whole drive: raw samples in, gate signals out.  This top only instantiates.
 --
 --   raw sample -> conditioning -> transforms -> control -> modulation -> gates;  estimators beside it

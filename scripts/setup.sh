@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
 # Set up what a target of the Makefile uses, on Debian 12 or Ubuntu 22.04 and newer (scripts/setup/needs.sh lists it):
 #   - system packages, with apt-get (only the missing ones; needs root or sudo without a password)
 #   - .venv with the exact Python packages of requirements.lock that belong to the target's groups

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: runs every function of fixed_pkg on the lines of a file and writes what comes out.
 -- A line holds drop, width and x as a bit string; so one run covers any number of formats.
 -- Output line: round_half_up, saturate, exceeds, saturate_u, round_sat, clamp to +-2**(width-1), the difference to its

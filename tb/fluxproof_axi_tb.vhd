@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: a first look at the AXI top, for `fusesoc run --target=sim`: is it there, does it refuse what it must, do
 -- the gates switch when enabled, does the telemetry come, does a trip end it.  Ends with "passed", or with a failure
 -- that says what was wrong.  The numbers are proven elsewhere (cocotb_tests/).

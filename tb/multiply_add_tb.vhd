@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: multiply_add with ports of given widths, for the bench of the blocks.
 
 library ieee;

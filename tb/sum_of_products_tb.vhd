@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: sum_of_products with ports of given widths, for the bench of the blocks; c and d are delayed here, so that
 -- the bench gives all operands of a sum in one clock.
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Every registered block: RTL equal to its model in every bit, model within its bound of the float reference."""
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ def test_rtl_equals_model(block, config):
 @pytest.mark.parametrize(
     ("block", "config"),
     [c for c in CASES if c[0].reference],
-    ids=[i for i, c in zip(IDS, CASES) if c[0].reference],
+    ids=[i for i, c in zip(IDS, CASES, strict=True) if c[0].reference],
 )
 def test_model_within_bound(block, config):
     generics = block.configs[config]
@@ -55,7 +56,7 @@ def test_model_within_bound(block, config):
                 error = (error + 0.5) % 1.0 - 0.5  # an angle
             assert abs(error) <= allowed[name] + 1e-12, (name, row, got[name], value, error, allowed[name])
             worst[name] = max(worst.get(name, 0.0), abs(error) / max(allowed[name], 1e-30))
-    if not block.name == "pwm_compare":
+    if block.name != "pwm_compare":
         assert set(worst) >= {p.name for p in block.outputs if _is_quantity(p)}
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Front ends against models of the converters that are not derived from the RTL, converted and in Verilator.
 
 In each run the RTL equals the golden model at every clock, and the codes are what the converter has held at its

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """fixed.py and fixed_pkg.vhd: equal for every value of every small format, and for random values of wide ones."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Properties of the gates that are true for any inputs, checked on the model by independent code.
 
 The bench shows that the RTL equals the model at every clock; this shows that the model is safe.

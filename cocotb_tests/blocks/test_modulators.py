@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Input of delta-sigma modulators and the fast overcurrent filter; the bench shows that their RTL is the same.
 
 The models of the modulators are not derived from the blocks.

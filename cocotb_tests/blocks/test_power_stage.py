@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The asynchronous path from the trip pin to the gates: any time, any pulse length, with and without a clock."""
 
 from fluxproof.cosim import ghdl

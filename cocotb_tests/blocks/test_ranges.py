@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Assumptions of a block on its inputs, checked against the blocks before it for every relevant value."""
 
 from __future__ import annotations

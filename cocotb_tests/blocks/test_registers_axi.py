@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The registers on the bus: the VHDL against its twin, and everything generated from the SystemRDL against the map."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Every choice of front ends elaborates; each kind of encoder and converter brings samples to the core."""
 
 from __future__ import annotations

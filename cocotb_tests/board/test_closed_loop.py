@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """fluxproof_board turns a motor from A/B/Z edges and SPI lines to gates, at every clock as the golden board."""
 
 from __future__ import annotations
@@ -82,7 +83,8 @@ def check_stream(facts: dict, drive, folder: Path) -> None:
     The speed of every sample is that between edges, which no register has.
     """
     words = np.fromfile(facts["folder"] / "capture.bin", "<u4").reshape(-1, COUNT)
-    said = [dict(zip(Sample._fields, a)) | dict(zip(Observed._fields, b)) for a, b in facts["history"]]
+    names = (*Sample._fields, *Observed._fields)
+    said = [dict(zip(names, (*a, *b), strict=True)) for a, b in facts["history"]]
     wanted = [pack(k, values) for k, values in enumerate(said)]
     assert len(words) > 10 and words.tolist() == [list(wanted[k]) for k in words[:, 1]]
     assert all(values["speed_was_given"] for values in said[-len(words) :])

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Commissioning on simulated boards: one motor, each fault once, the command, the window of a Zynq."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """fluxproof_board.xdc names a register for every asynchronous pin, and registers that exist."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Figures of the double update for `make board`: RTL against golden model, bandwidth and phase margin."""
 
 import pytest

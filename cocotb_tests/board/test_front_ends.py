@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the front ends do to the drive: a wrong index trips it by name; the host may give the position."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The four runs of a drive that is set up wrongly: each ends in a named fault, or within the limit of the current."""
 
 from __future__ import annotations

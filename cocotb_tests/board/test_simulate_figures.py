@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """How long `fluxproof simulate` takes on the drives with front ends, and what it says of them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The AXI top as software and power stage see it: closed loop over registers, pins and stream, equal in every bit."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Registers of the front ends from a drive file: one function for the table, the header and the bus."""
 
 from __future__ import annotations

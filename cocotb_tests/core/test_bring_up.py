@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """docs/software/bring_up.c on the golden model and on the RTL behind AXI: the motor turns, errors are reported."""
 
 from __future__ import annotations

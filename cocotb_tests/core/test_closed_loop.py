@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The RTL in closed loop: equal to the golden model at every period; PWM timing on its own gate edges.
 
 The long run is the converted RTL in Verilator; GHDL runs a shorter one on the VHDL itself with the same events.

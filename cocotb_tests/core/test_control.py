@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The golden drive as a controller: recovery from long saturation, both directions, over the averaged plant."""
 
 from __future__ import annotations
@@ -146,7 +147,7 @@ def test_no_second_stable_point_at_high_speed(omega_e, i_q_ref, sign):
     def run(start=None):
         return simulate_drive(
             0.4,
-            lambda t: np.zeros_like(t),
+            np.zeros_like,
             i_q=lambda t: np.full_like(t, sign * i_q_ref),
             load=lambda t: np.full_like(t, speed),
             omega_m=speed,
@@ -166,7 +167,7 @@ def test_above_the_voltage_limit_the_current_stays_within_the_rated(sign):
     speed = sign * 2200.0 / DRIVE.machine.pole_pairs
     _, out = simulate_drive(
         0.4,
-        lambda t: np.zeros_like(t),
+        np.zeros_like,
         i_q=lambda t: np.full_like(t, sign * 3.0),
         load=lambda t: np.full_like(t, speed),
         omega_m=speed,
@@ -180,7 +181,7 @@ def test_minimum_pulse_close_to_the_voltage_limit(min_pulse, swing):
     """At 1900 rad/s, 97 % of the limit: i_q swings only because short low ends are closed; it stays bounded."""
     _, out = simulate_drive(
         1.0,
-        lambda t: np.zeros_like(t),
+        np.zeros_like,
         i_q=lambda t: np.full_like(t, 3.0),
         load=lambda t: np.full_like(t, 475.0),
         omega_m=475.0,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Sampling and update at both extremes of the carrier: RTL equal to the golden model, edges where they belong, loss."""
 
 from __future__ import annotations

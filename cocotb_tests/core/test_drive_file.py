@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Every error in drive.toml or on the command line gives one clear line; the table and the JSON file."""
 
 import codecs

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The drives of real motors in docs/drives: their front ends, `fluxproof simulate`, RTL against golden model."""
 
 from __future__ import annotations

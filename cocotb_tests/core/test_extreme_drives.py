@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Drive files with keys at the ends of their ranges and beyond: every command works or refuses in one line."""
 
 import random

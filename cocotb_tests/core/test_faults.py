@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Faults: requirements of the protection, on the golden core, the VHDL in GHDL and the converted RTL."""
 
 from __future__ import annotations

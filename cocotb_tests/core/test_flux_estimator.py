@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The flux estimator in closed loop: the papers' findings, the equations behind them, faults and recovery."""
 
 from __future__ import annotations

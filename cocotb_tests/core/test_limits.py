@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Limits that hold: what a drive described wrongly or asked for too much ends in, golden core on the switching plant.
 
 The same values go through the VHDL and the converted RTL in the tours of faults and the closed loops.
@@ -125,7 +126,7 @@ def open_core(carrying, **changes):
     core.advance(1, enable=1)
     code, step = 0, 65536 * 25 // 10000
     amplitude = 2000
-    for k in range(500):
+    for _ in range(500):
         theta = 2 * math.pi * 4 * code / 65536
         sample = {f"adc_{x}": 32768 for x in "abc"}
         for n, x in enumerate("abc"):

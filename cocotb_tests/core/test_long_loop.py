@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Long runs of the converted RTL in Verilator: equal to the golden model, also at the full 200 MHz / 10 kHz ratio."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """From drive.toml to the core's integers: closed forms, ranges, round trips, options."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The registers' integers correspond to the SI values: one sample through the blocks."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`fluxproof simulate`: verdicts and exit status, margins against a simulation of the equations, the report."""
 
 from __future__ import annotations

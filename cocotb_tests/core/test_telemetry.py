@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The telemetry stream end to end: core and stream in GHDL, capture, reader, dump, replay; and damaged captures."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The converted Verilog is the VHDL: both run on the same stimulus, every output is compared at every clock.
 
 The VHDL runs in the machine's GHDL, which had no part in the conversion; the Verilog runs in Verilator.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The converted AXI top is the VHDL: bus, stream and trip pin at random, every output compared at every clock."""
 
 from __future__ import annotations

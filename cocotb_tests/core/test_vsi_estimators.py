@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Dead-time voltage, compensation, magnets' flux, winding resistance: findings, word lengths, fallbacks."""
 
 from __future__ import annotations

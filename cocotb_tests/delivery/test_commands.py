@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Every command as a user starts it: one line for any error and signal, outputs together or not at all, inputs kept."""
 
 from __future__ import annotations
@@ -157,7 +158,7 @@ def test_any_error_is_one_line(error, words, inputs, monkeypatch, capsys):
 
 
 def test_a_closed_or_full_standard_output(tmp_path):
-    full = run(tmp_path, ["--help"], capture_output=False, stdout=open("/dev/full", "w"), stderr=subprocess.PIPE)
+    full = run(tmp_path, ["--help"], capture_output=False, stdout=open("/dev/full", "w"), stderr=subprocess.PIPE)  # noqa: SIM115
     assert one_line(full) == "standard output: No space left on device"
     for closed in ("1>&-", "2>&-", "1>&- 2>&-"):
         done = run(tmp_path, [], program=["sh", "-c", f'"{sys.executable}" -m fluxproof --help {closed}'])

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The texts beside the code: links lead somewhere, section numbers are those of the headings, lists are complete.
 
 Commands that select tests select at least one, paths exist, and tests that are named exist.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """fluxproof.core in FuseSoC: lint and simulation run, the projects for yosys and Vivado are complete."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`make fuzz`: a fixed number of cases of each target without a find, and planted faults that the judge must notice."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Names of files that hold another language: every file of every command says the same as for a harmless name."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Directions of imports: the contract of pyproject.toml holds, no test imports a test, violations are detected."""
 
 from __future__ import annotations

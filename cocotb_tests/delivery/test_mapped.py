@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The netlist that is counted computes what the core does: one block in the test run, the whole in `make synth`."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`make mutate` on a small block: drawn, noticed, proved equivalent; where nothing is compared, nothing is noticed."""
 
 from __future__ import annotations

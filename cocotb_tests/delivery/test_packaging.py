@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The AXI top and component.xml: up to date, valid by the schema, consistent with VHDL and register map."""
 
 from __future__ import annotations

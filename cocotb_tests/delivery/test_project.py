@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`fluxproof project`: every file follows the drive file, the clock most of all; the scripts run in the stub."""
 
 from __future__ import annotations
@@ -63,7 +64,8 @@ def test_nothing_else_depends_on_the_clock(tmp_path):
     _, slow, _ = made(tmp_path, "slow", clock_hz="100e6")
     differing = []
     for name in fast:
-        pairs = zip(fast[name].replace("fast.toml", "").splitlines(), slow[name].replace("slow.toml", "").splitlines())
+        texts = (fast[name].replace("fast.toml", ""), slow[name].replace("slow.toml", ""))
+        pairs = zip(*(text.splitlines() for text in texts), strict=True)
         differing += [(name, a) for a, b in pairs if a != b]
     assert len(differing) == len(clock_values(fast)) + 1, differing  # the comment of the constraint
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`make prove` on two properties with their planted faults; false properties are reported as such."""
 
 from __future__ import annotations

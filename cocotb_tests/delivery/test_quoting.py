@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """fluxproof/quote.py: any string of Unicode in, read back the same by the language itself, or refused by name."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The script that `make` sets up, and other ways to start the command: `fleet` with two workers, Ctrl-C."""
 
 from __future__ import annotations

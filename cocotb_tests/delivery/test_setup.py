@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the set-up must not do: delete what an installation running beside it has fetched."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Results enter their folder together or not at all: exceptions, full disks, signals, killed and simultaneous runs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`make synth`: counts, kept values, and the size of the blocks against the kept values."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Longest paths and DSP registers of `make synth`, on small netlists whose answer is counted by hand."""
 
 from __future__ import annotations

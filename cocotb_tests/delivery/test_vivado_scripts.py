@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The Tcl for Vivado run by tclsh against a stub that knows the commands, the files and the core's pins."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The wheel in an empty environment: two packages, nothing but their run-time dependencies, and the command works."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Texts that users read use the words of the field: no string, template or heading contains a word of the list.
 
 Strings are those of all modules of the package that are neither docstrings nor single words (keys, codes, names).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`fluxproof diagnose` as a command: exit status, files, printed text; the digital part end to end."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One operating point: what drifts while it is held, and a constant misfit."""
 
 from __future__ import annotations

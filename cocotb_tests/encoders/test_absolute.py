@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Serial absolute encoders against models of the encoders: single-bit errors are caught, any cable, RTL as golden."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The RTL against its golden model over a million edges: in Verilator, and a part of them in GHDL."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Hall sensors against a model of the sensors: angle, steps, illegal codes, the start of an incremental encoder."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Incremental encoder against a model of the encoder: angle, speed, index, lost counts, a real capture."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Files of strangers: what is no regular file, manifests in other encodings, addresses, names that are not UTF-8."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Manifests, folders and patterns: what is found, and what a mistake says."""
 
 from __future__ import annotations

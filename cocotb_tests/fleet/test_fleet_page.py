@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """fleet.html in headless Chromium, with every part it can have, and hostile names."""
 
 from __future__ import annotations

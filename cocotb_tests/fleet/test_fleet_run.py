@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`fluxproof fleet` on a small fleet: stopped and resumed, changed recordings, bad ones, killed workers, a cluster."""
 
 from __future__ import annotations

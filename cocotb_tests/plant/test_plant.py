@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The plant against closed forms, an independent simulator and measured flux.
 
 Every tolerance states where it comes from.  "Rounding" means: nothing but

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The blind benchmark: its simulator satisfies flux balance and energy conservation, its seal detects changes."""
 
 from __future__ import annotations
@@ -129,8 +130,8 @@ def test_flux_is_reciprocal_and_inverts(kind, cross):
     h = 1e-4
     for i_d, i_q in ((-3.0, 4.0), (1.0, -5.0), (-0.5, 0.2)):
         psi_d, psi_q, dd, dq, qq = flux(m, i_d, i_q)
-        by_d = [(x - y) / (2 * h) for x, y in zip(flux(m, i_d + h, i_q)[:2], flux(m, i_d - h, i_q)[:2])]
-        by_q = [(x - y) / (2 * h) for x, y in zip(flux(m, i_d, i_q + h)[:2], flux(m, i_d, i_q - h)[:2])]
+        by_d = [(x - y) / (2 * h) for x, y in zip(flux(m, i_d + h, i_q)[:2], flux(m, i_d - h, i_q)[:2], strict=True)]
+        by_q = [(x - y) / (2 * h) for x, y in zip(flux(m, i_d, i_q + h)[:2], flux(m, i_d, i_q - h)[:2], strict=True)]
         assert (by_d[0], by_q[0], by_d[1], by_q[1]) == pytest.approx((dd, dq, dq, qq), abs=1e-8)
         assert current(m, psi_d, psi_q, 0.0, 0.0) == pytest.approx((i_d, i_q), abs=1e-7)
 
@@ -178,7 +179,8 @@ def _misfit_of(effect, size=0.5):
     half = design.truth().reshape(2, len(LINES), -1)
     found, foreseen = [], []
     for line, order in (("mean", 0), ("-2", -2)):
-        for k, (end, s) in enumerate(zip(np.cumsum([s[3] for s in plan.segments]), plan.segments)):
+        ends = np.cumsum([s[3] for s in plan.segments])
+        for k, (end, s) in enumerate(zip(ends, plan.segments, strict=True)):
             part = slice(end - s[3] // 2, end - 3)
             found.append(np.mean(r[part] * np.exp(-1j * order * theta[part])))
             foreseen.append(half[0, LINES.index(line), k] + 1j * half[1, LINES.index(line), k])

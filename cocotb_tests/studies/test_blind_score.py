@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The blind benchmark's scorer on synthetic answers: every figure can be right and wrong."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The comparison with other methods: each names the effect of a synthetic recording, and its figures can be wrong."""
 
 from __future__ import annotations

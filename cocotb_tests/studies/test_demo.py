@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The demo's pieces: numbers on made-up data, a self-contained page, a recording through its codes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The flux map from a recording: the co-energy of a synthetic machine is identified within the recorded range only."""
 
 from __future__ import annotations

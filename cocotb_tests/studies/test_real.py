@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Real recordings: what they determine, what they do not, and both on held-out rows.
 
 Without the recordings, whose folder FLUXPROOF_RECORDINGS names (default ../shared/recordings), these tests skip.

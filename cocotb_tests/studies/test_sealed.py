@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The sealed generator against physics and against itself, never against the tool: voltages, energy, codes."""
 
 from __future__ import annotations
@@ -140,7 +141,7 @@ def _leg_mean(v, duty, i, u=100.0):
     assert np.max(np.diff(times[:count])) <= v.period / 20 * (1 + 1e-9) and times[0] == 0.0
     for _ in range(2):
         total = 0.0
-        for a, b in zip(times[: count - 1], times[1:count]):
+        for a, b in zip(times[: count - 1], times[1:count], strict=True):
             if b - a > 1e-13:
                 state = inverter.state(0.5 * (a + b), up, down, v.dead, 0)
                 mean, node = inverter.leg(v, state, node, u, i, b - a)

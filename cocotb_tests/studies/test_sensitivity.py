@@ -1,8 +1,10 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The sensitivity of the verdicts to the constants: what is varied, what counts as changed, and the figures."""
 
 from __future__ import annotations
 
 import ast
+from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -17,7 +19,7 @@ from studies.sensitivity.steps import Steps, recorded, varied
 
 
 def test_every_constant_is_varied():
-    declared = {t.id for node in ast.parse(open(constants.__file__).read()).body if isinstance(node, ast.Assign)
+    declared = {t.id for node in ast.parse(Path(constants.__file__).read_text()).body if isinstance(node, ast.Assign)
                 for target in node.targets for t in ast.walk(target) if isinstance(t, ast.Name)}  # fmt: skip
     assert declared == set(names()) | set(OF_ONE_POINT)
     text = (ROOT / "docs" / "diagnosis.md").read_text()

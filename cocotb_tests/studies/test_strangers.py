@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Generators written by others: deterministic, independent of the catalogue, and each fault really in the data."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What several tests share, in rooms by what it is; no test imports another test.
 
 drives.py       drive files, and the numbers of the machine of most tests

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A page in headless Chromium.
 
 The unchanged page is in a frame of 400 px with its own Content-Security-Policy; a script outside the frame inspects it

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The drives of the tests: files in docs/drives, changed ones, and the numbers of the machine of most tests.
 
 PAPER is the drive of Zanuso, Peretti, Zigliotto (IET EPA 2015); R to PAIRS are its machine and bus, PLAIN a file with

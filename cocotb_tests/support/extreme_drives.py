@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Drive files with keys at the ends of their ranges, and everything that a command derives from one before it runs."""
 
 from __future__ import annotations

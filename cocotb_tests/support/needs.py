@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What a test needs beyond the Python packages; it is skipped, with the reason, where that is absent."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Cases that `make slow` looks at and `make test` leaves out."""
 
 import pytest

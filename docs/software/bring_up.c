@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 /* Brings a drive up over its registers: is it the right core, load the drive, check, enable, ramp the speed or the
  * torque current up and down, read back, stop.  The gates are off before it starts and, whatever goes wrong, when it
  * ends: Ctrl-C, SIGTERM and a bus error included.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 /* The core's window through Linux' userspace I/O: give the core's node in the device tree
  * compatible = "generic-uio" (`fluxproof project` writes it as fluxproof.dtsi), and its number to FLUXPROOF_UIO
  * (0 for /dev/uio0, the default).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 /* The functions of the board for bring_up.c: two accesses to the core's 4 KiB window, and time.
  * bus_uio.c has them for Linux on a Zynq; write your own for anything else. */
 

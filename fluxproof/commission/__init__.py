@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """``fluxproof commission``: what a drive file cannot know is measured over the registers, or refused with a reason.
 
 bus        reading and writing registers by name; a Zynq's userspace I/O

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Direction and offset of the encoder: the field turns slowly by one turn of the shaft each way, the rotor follows.
 
     theta_me = +-pole_pairs * code + theta_offset

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Registers by name: the protocol that commissioning speaks, and the window of a Zynq through userspace I/O.
 
 A snapshot is one sample of the core: the codes of sensors and encoder, kept by ``take_snapshot``, and the currents,
@@ -34,18 +35,23 @@ class Bus(Protocol):
 
     def read(self, name: str) -> int:
         """The integer in a register."""
+        ...
 
     def write(self, name: str, value: int) -> None:
         """Set a register; BusError where its range does not hold the value."""
+        ...
 
     def snapshot(self) -> dict[str, int]:
         """CODES, VALUES and theta_me of one sample, not of the one that follows the last snapshot."""
+        ...
 
     def wait(self, seconds: float) -> None:
         """Let the drive run."""
+        ...
 
     def now(self) -> float:
         """Seconds since any moment."""
+        ...
 
 
 def checked(registers, name: str, value: int) -> int:

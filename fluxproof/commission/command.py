@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The subcommand ``fluxproof commission drive.toml [--bus sim|/dev/uioN] [--out DIR]``: drive.toml and commission.json.
 
 Exit status: 0 accepted, 1 refused, 130 stopped by a signal, with the reason in one line on stderr, 2 bad input.  The

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """drive.toml with the measured values in place, and commission.json."""
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ KEYS = (
     ("machine", "viscous_friction_nms", "viscous_friction"),
     ("machine", "coulomb_friction_nm", "coulomb_friction"),
     ("sensors", "current_offset_code", "offset_b"),
-    ("sensors", "position_reverse", None),
+    ("sensors", "position_reverse", ""),
     ("sensors", "theta_offset_rad", "theta_offset"),
 )
 # Gains that were given for other values: the bandwidths and the measured values give new ones.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Inertia and friction from torque steps, the magnet flux from held speeds, and a point that was not fitted.
 
 Torque steps of i_q both ways, the place of the shaft [electrical rad] from the encoder, integrals over snapshots:
@@ -118,7 +119,7 @@ def _steps(s: Session, current: float, top: float) -> tuple[list[Seen], float]:
     s.settle(0.02)
     s.load(*current_gains(s))
     s.gates_on()
-    target, pieces = from_si("omega_ref", top, s.drive), []
+    target, pieces, sign = from_si("omega_ref", top, s.drive), [], 1.0
     for n in range(2 * CYCLES + 1):
         sign = 1.0 if n % 2 == 0 else -1.0
         s.set(i_q_ext=sign * current)

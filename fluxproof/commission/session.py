@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the steps share: registers in force, snapshots in SI units, the watch on the currents, the gates."""
 
 from __future__ import annotations
@@ -57,8 +58,10 @@ class Seen:
     def __init__(self, drive: Drive, rows: list[dict], times: list[float]):
         columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         self.t = np.array(times)
-        for name in ("i_d", "i_q", "u_d", "u_q", "omega_me", "u_dc"):
-            setattr(self, name, to_si(name, columns[name], drive))
+        names = ("i_d", "i_q", "u_d", "u_q", "omega_me", "u_dc")
+        self.i_d, self.i_q, self.u_d, self.u_q, self.omega_me, self.u_dc = (
+            to_si(name, columns[name], drive) for name in names
+        )
         self.theta_me = np.unwrap(to_si("theta_me", columns["theta_me"], drive))
         self.adc = np.array([columns[f"snap_adc_{x}"] for x in "abc"]).T
         turns = 2.0**-drive.sensors.position_bits

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The registers of fluxproof_board in front of the golden core, the switching plant and imperfect sensors.
 
 Period by period as in cosim/golden_loop.  A write of a setting acts from the next sample on, a snapshot is that of a

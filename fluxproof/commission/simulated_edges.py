@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Edges of an incremental encoder or of Hall sensors at the samples of a simulated drive: speed and Hall code.
 
 As encoders/edge_timer, with real numbers: counts between the last edges of two samples over the time between these

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """All steps in order; whatever happens, the gates are off afterwards."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """R, L_d, L_q and the dead-time voltage from a current vector that rotates too fast for the rotor.
 
 The regulators hold a vector in the frame of the forced angle.  A snapshot k has the current i(k) at the angle phi of

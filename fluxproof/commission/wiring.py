@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Offsets of the current sensors with the gates off; then which sensor answers to which leg.
 
 Offsets: mean code of each sensor; its uncertainty is the codes' deviation over the root of their number.

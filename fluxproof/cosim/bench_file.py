@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the bench in the simulator has to do, as plain values in a file.
 
 The simulator starts a Python of its own for each bench.  It imports this file and cocotb, and not the models, whose

@@ -1,7 +1,9 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Makes the file of a block's bench: its schedule (cosim/schedule.py) as rows for the simulator."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 from fluxproof.cosim.bench_file import Bench, Row, save
@@ -18,7 +20,7 @@ def eventful(block: Block, clocks: list[Clock]) -> list[int]:
     if block.clocked or block.atomic:
         return list(range(len(clocks)))
     chosen = {0, 1, 2, 3, 4, len(clocks) - 1}
-    for number, (before, clock) in enumerate(zip(clocks, clocks[1:]), 1):
+    for number, (before, clock) in enumerate(pairwise(clocks), 1):
         if clock.writes or clock.expected or (clock.rst, clock.in_valid) != (before.rst, before.in_valid):
             chosen.add(number)
         if clock.out_valid or clock.soon:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The one bench, the part that runs inside the simulator: drives the rows of a file and compares with ``==``."""
 
 from __future__ import annotations

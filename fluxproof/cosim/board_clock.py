@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The golden fluxproof_board clock by clock: pins in, pins out; the core's samples as in golden_clock.
 
 The front ends' twins (golden_model/encoders, converters, io) and the clocked part of the core are wired as in
@@ -9,6 +10,7 @@ without a clock, changes between two clocks here (io/power_stage.vhd).
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import NamedTuple
 
 import numpy as np
@@ -86,9 +88,7 @@ class State(NamedTuple):
 
 # Registers of the core that the front ends and the interrupt read
 OF_THE_CORE = ("reverse", "omega_given", "speed_given", "irq_mask", "irq_clear")
-BoardRegisters = NamedTuple(
-    "BoardRegisters", [(name, int) for name in (*board_map.settings(), *OF_THE_CORE)]
-)  # fmt: skip
+BoardRegisters = namedtuple("BoardRegisters", (*board_map.settings(), *OF_THE_CORE))
 
 
 @kernel
@@ -288,7 +288,7 @@ class BoardClock:
         """The results of a sample that has entered with these wires, and their clocks; settings are those after it."""
         self.samples += 1
         values = self.registers.values
-        sample = fluxproof.Sample(w.adc_a, w.adc_b, w.adc_c, w.adc_u_dc, w.position_code, *references, w.running)
+        sample = fluxproof.Sample(w.adc_a, w.adc_b, w.adc_c, w.adc_u_dc, w.position_code, *references, run=w.running)
         gates = self.state.of_core.of_gate_generation
         registers = self._settings()._replace(
             min_pulse=gates.min_pulse,
@@ -297,8 +297,9 @@ class BoardClock:
             speed_given=w.speed_now,
             position_restart=1 if values["position_restart"] or w.position_restart else 0,
         )
-        self.of_samples, self.observed = fluxproof.step(self.of_samples, sample, registers, self.blocks.core)
+        self.of_samples, observed = fluxproof.step(self.of_samples, sample, registers, self.blocks.core)
+        self.observed = observed
         del self.history[self.samples - 1 :]  # of a clock that is made again
-        self.history.append((sample, self.observed))
+        self.history.append((sample, observed))
         for after, names in clocked.DUE.values():
-            self._due.append((self.clock - 1 + after, {name: getattr(self.observed, name) for name in names}))
+            self._due.append((self.clock - 1 + after, {name: getattr(observed, name) for name in names}))

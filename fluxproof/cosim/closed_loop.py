@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Closed loop: gate edges switch the plant, the plant's sensors feed the core, the golden model runs in parallel.
 
 The device under test runs one PWM period at a time (see Device): the VHDL in GHDL, its Verilog
@@ -88,13 +89,13 @@ def load_torque(load, brake, omega_m):
 class Period:
     """The outputs of a device from one sample_trigger to the next: a PWM period, half of one with double_update."""
 
-    observed: dict[str, int] | None  # None if no sample was processed
+    observed: dict[str, int | str] | None  # None if no sample was processed; text where a simulator has no 0 or 1
     edge_clocks: np.ndarray
     gate_words: np.ndarray
     clocks: int
     sample_to_duty: int
-    running: int  # when the sample was taken
-    flags: tuple[int, ...] = ()  # FLAGS at the end
+    running: int | str  # when the sample was taken
+    flags: tuple[int | str, ...] = ()  # FLAGS at the end
 
 
 class Device(Protocol):
@@ -102,12 +103,15 @@ class Device(Protocol):
 
     async def start(self, registers, enable: int) -> Period:
         """Reset, set the registers, run to the first sample_trigger."""
+        ...
 
     async def period(self, inputs: dict[str, int], enable: int) -> Period:
         """From this sample_trigger to the next; ``inputs`` are the raw sample's ports."""
+        ...
 
     def change(self, registers: Mapping[str, int]) -> None:
         """Set registers, now, between two periods."""
+        ...
 
 
 def gate_words(seen: np.ndarray) -> np.ndarray:
@@ -156,7 +160,8 @@ class Result:
     differences: int = 0
     first_difference: str | None = None
     sample_to_duty_clocks: int = 0
-    gate_edges: np.ndarray | None = None  # rows of (period, clock, gate word) of the device
+    # of the device: rows of (period, clock, gate word)
+    gate_edges: np.ndarray = field(default_factory=lambda: np.zeros((0, 3), np.int64))
     state: fluxproof.State | None = None  # the golden model's, at the end
 
 
@@ -227,6 +232,7 @@ class Comparison:
         """One period on both; ``inputs`` by the names of INPUT_PORTS, in their order.  Returns the device's."""
         wanted = self.golden.run(inputs, enable)
         got, golden = await self.device.period(inputs, enable), self.golden.core.observed
+        assert golden is not None  # a sample has entered
         self.compare(got, golden, wanted)
         k = len(self.observed)
         self.edges += [(k, int(c), int(w)) for c, w in zip(got.edge_clocks, got.gate_words, strict=True)]

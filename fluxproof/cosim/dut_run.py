@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Inside GHDL: the run that FLUXPROOF_RUN names (cosim/runs.py), on the VHDL."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Reads an entity's generics and ports from its VHDL: one declaration per line with its comment."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A top with plain ports around an entity whose ports are records, for simulators that cannot see into a record.
 
 A field becomes a port under its own name; the fields of sample_t keep the names and widths of sample_latch.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Builds an entity with GHDL and runs a cocotb module on it; the one place that talks to the simulator."""
 
 from __future__ import annotations
@@ -91,27 +92,26 @@ def run(
     if (built / toplevel).exists():
         (folder / toplevel).symlink_to(built / toplevel)
     # GHDL's warnings about metavalues at time zero say nothing; the bench checks for metavalues itself.
-    command = dict(
-        hdl_toplevel=toplevel,
-        hdl_toplevel_lang="vhdl",
-        hdl_toplevel_library="top",
-        test_module=module,
-        parameters=generics,
-        build_dir=built,
-        test_dir=folder,
-        test_args=["--std=08", f"--workdir={built}"],
-        plusargs=["--ieee-asserts=disable", *_waves(folder)],
-        extra_env={
-            "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
-            # Else pytest recompiles all that is imported (numba, scipy) to explain asserts: seconds in every run.
-            "COCOTB_REWRITE_ASSERTION_FILES": "dut_*.py",
-            **environment,
-        },
-        log_file=_log(folder, "test.log"),
-        results_xml=str(folder / "results.xml"),
-    )
     with contextlib.suppress(SystemExit):  # how the runner says that a test failed: the caller asks failure()
-        get_runner("ghdl").test(**command)
+        get_runner("ghdl").test(
+            hdl_toplevel=toplevel,
+            hdl_toplevel_lang="vhdl",
+            hdl_toplevel_library="top",
+            test_module=module,
+            parameters=generics,
+            build_dir=built,
+            test_dir=folder,
+            test_args=["--std=08", f"--workdir={built}"],
+            plusargs=["--ieee-asserts=disable", *_waves(folder)],
+            extra_env={
+                "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
+                # Else pytest recompiles all that is imported (numba, scipy) to explain asserts: seconds in every run.
+                "COCOTB_REWRITE_ASSERTION_FILES": "dut_*.py",
+                **environment,
+            },
+            log_file=_log(folder, "test.log"),
+            results_xml=str(folder / "results.xml"),
+        )
     return folder
 
 

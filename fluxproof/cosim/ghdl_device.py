@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The VHDL in GHDL as a device of the closed loop (cosim/closed_loop.py): one period at a time."""
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ class GhdlDevice:
             # Both vectors change at a rising edge; half a clock later both have settled, and one task sees both.
             clock = now()
             await FallingEdge(self.dut.clk)
-            word = read(high, False) + 8 * read(low, False)
+            word = int(read(high, False)) + 8 * int(read(low, False))
             if word != self.word:
                 self.word = word
                 self.edges.append((clock, word))
@@ -88,7 +89,7 @@ class GhdlDevice:
         for name, value in registers.items():
             getattr(self.dut, name).value = int(value)
 
-    async def _finish(self, observed, duty_clocks: int, running: int) -> Period:
+    async def _finish(self, observed, duty_clocks: int, running: int | str) -> Period:
         await RisingEdge(self.dut.sample_trigger)
         end = now()
         await FallingEdge(self.dut.clk)

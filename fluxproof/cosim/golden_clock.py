@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The golden core clock by clock: raw samples may enter at any clock, the port values are returned after every clock.
 
 fluxproof.step calculates the values of a sample at once; the clocked part (golden_model/clocked.py) gets them after
@@ -68,7 +69,7 @@ class GoldenClock:
                 until_trigger,
                 seen,
             )
-            if entered:
+            if entered and sample is not None:
                 self._enter(sample)
             self.clock += made
             left -= made
@@ -80,13 +81,12 @@ class GoldenClock:
 
     def _enter(self, sample: Mapping[str, int]) -> None:
         """The results of a sample that enters at this clock, and their clocks."""
-        self.samples.append(fluxproof.Sample(*sample.values(), self.running))
+        self.samples.append(fluxproof.Sample(*sample.values(), run=self.running))
         # The duties use what is in force: a minimum pulse that the gates refuse is not, nor double_update given while
         # they are on.
         gates = self.state.of_gate_generation
         registers = self.registers._replace(min_pulse=gates.min_pulse, double_update=gates.double_update)
-        self.of_samples, self.observed = fluxproof.step(
-            self.of_samples, self.samples[-1], registers, self.config
-        )
+        self.of_samples, observed = fluxproof.step(self.of_samples, self.samples[-1], registers, self.config)
+        self.observed = observed
         for after, names in clocked.DUE.values():
-            self._due.append((self.clock + after, {name: getattr(self.observed, name) for name in names}))
+            self._due.append((self.clock + after, {name: getattr(observed, name) for name in names}))

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The golden model in compiled loops: open loop, and closed with the averaged or the switching plant."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Where a simulator finds the core's values: the ports of its records are invisible, those of the instances are not."""
 
 from __future__ import annotations

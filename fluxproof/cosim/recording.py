@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A recording of a real drive as a run of the core: open loop, one row of the log in a PWM period.
 
 The log's dq currents, speed and bus voltage become the codes that the converters and the resolver of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Runs of the core in parallel with the golden model: the same run in Verilator and in GHDL, each in its own process.
 
 A run is named by the function that makes it (see Named), so that the process that carries it out, a simulator's among
@@ -19,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -40,7 +41,7 @@ from fluxproof.files import write_json
 from fluxproof.plant import FREE, Machine, Sensors
 from golden_model import drive as drives
 from golden_model.fluxproof import Config
-from golden_model.registers import registers
+from golden_model.registers import RegisterSet, registers
 
 FILES = ("progress", "result.npz", "summary.json")
 Progress = Callable[[int, int], None]
@@ -53,17 +54,19 @@ class Run(Protocol):
 
     def __len__(self) -> int:
         """Periods."""
+        ...
 
     async def on(self, device: Device, progress: Progress) -> Result:
         """Carry the run out."""
+        ...
 
 
 @dataclass(frozen=True)
 class ClosedLoop:
     """A scenario in closed loop; the fields are the arguments of cosimulate."""
 
-    drive: object
-    registers: object
+    drive: drives.Drive
+    registers: RegisterSet
     scenario: Scenario
     machine: Machine | None = None
     ideal_inverter: bool = False
@@ -78,8 +81,17 @@ class ClosedLoop:
         return len(self.scenario)
 
     async def on(self, device: Device, progress: Progress) -> Result:
-        options = dict(machine=self.machine, ideal_inverter=self.ideal_inverter, sensors=self.sensors, mode=self.mode)
-        return await cosimulate(device, self.drive, self.registers, self.scenario, progress, **options)
+        return await cosimulate(
+            device,
+            self.drive,
+            self.registers,
+            self.scenario,
+            progress,
+            machine=self.machine,
+            ideal_inverter=self.ideal_inverter,
+            sensors=self.sensors,
+            mode=self.mode,
+        )
 
 
 def closed_loop(drive_file: str, carrier_half: int, scenario: str, periods: int | None = None) -> ClosedLoop:
@@ -120,10 +132,11 @@ async def carry_out(run: Run, device: Device, folder: Path) -> Result:
     """The run on the device; its result goes into the folder."""
     began = time.monotonic()
     result = await run.on(device, progress_in(folder))
-    arrays = {f"observed_{name}": values for name, values in result.observed.items()}
+    arrays: dict[str, Any] = {f"observed_{name}": values for name, values in result.observed.items()}
     arrays |= {f"plant_{name}": values for name, values in result.plant.items()}
     temporary = folder / ".result.npz"
-    np.savez(temporary, **arrays, samples=result.samples, gate_edges=result.gate_edges)
+    arrays |= {"samples": result.samples, "gate_edges": result.gate_edges}
+    np.savez(temporary, **arrays)
     os.replace(temporary, folder / "result.npz")
     names = ("periods_compared", "differences", "first_difference", "sample_to_duty_clocks")
     counts = {name: getattr(result, name) for name in names}

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Scenarios for the drive: Fig. 9 of paper 001, and shorter ones that cover the other operating conditions."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """When the bench drives and compares what: the samples of a block (cosim/stimulus.py) clock by clock.
 
 Samples come back to back and with gaps; inputs are noise before and after the contract wants them; resets come in
@@ -6,6 +7,7 @@ mid-stream, with samples in flight.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -49,7 +51,7 @@ def following(draw: Samples, state) -> Sample | None:
         return None
 
 
-def schedule(block: Block, config: dict[str, int], seed: int, length: Length = LONG) -> list[Clock]:
+def schedule(block: Block, config: Mapping[str, int], seed: int, length: Length = LONG) -> list[Clock]:
     """Clock by clock, with what the model says must come out and when."""
     if block.clocked:
         return _clocked_schedule(block, config, seed, length)
@@ -136,13 +138,14 @@ def due(block: Block, clocks: list[Clock]) -> list[Due]:
         if clock.in_valid or clock.rst:
             last, left = clock.sample, {}
         for name, value in clock.expected.items():
-            if clock.expected.get(block.shown_with.get(name), 1):
+            shown = block.shown_with.get(name)
+            if shown is None or clock.expected.get(shown, 1):
                 entry.outputs.append((name, value))
         entries.append(entry)
     return entries
 
 
-def _clocked_schedule(block: Block, config: dict[str, int], seed: int, length: Length) -> list[Clock]:
+def _clocked_schedule(block: Block, config: Mapping[str, int], seed: int, length: Length) -> list[Clock]:
     """For a block whose sample is the clock.
 
     Outputs are due before the edge that follows the sample's; in reset they are zero but for ``after_reset``.

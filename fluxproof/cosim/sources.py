@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The VHDL files of the core in compile order, found from what they declare and use; no list to keep."""
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ def _needs(paths: Collection[Path]) -> tuple[dict[Path, set[Path]], set[Path]]:
             if kind.lower() == "package":
                 packages.add(path)
     needs = {
-        path: {declared_by.get(name.lower()) for name in _USE.findall(text)} - {None, path}
+        path: {declared_by[unit] for name in _USE.findall(text) if (unit := name.lower()) in declared_by} - {path}
         for path, text in texts.items()
     }
     return needs, packages

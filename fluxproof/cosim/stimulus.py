@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the one bench feeds a block: samples, made from the block's declaration and a seed.
 
 Every registered block gets the same treatment: all corner combinations of its ports (sampled where there are too
@@ -8,7 +9,7 @@ random values.  What is drawn may depend on the state before the sample: whoever
 from __future__ import annotations
 
 import itertools
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -68,7 +69,7 @@ def corners(ports: tuple[Port, ...], rng: np.random.Generator, most: int) -> Ite
         yield dict(zip((p.name for p in ports), values, strict=True))
 
 
-def samples(block: Block, config: dict[str, int], seed: int, length: Length = LONG) -> Samples:
+def samples(block: Block, config: Mapping[str, int], seed: int, length: Length = LONG) -> Samples:
     """All samples, in order, each within the ranges of its ports.  Raises ValueError for an own case that is not."""
     rng = np.random.default_rng(seed)
     ranges = [(p.name, p.low, p.high) for p in block.ports(config)]
@@ -86,7 +87,7 @@ def samples(block: Block, config: dict[str, int], seed: int, length: Length = LO
             return
 
 
-def _own(block: Block, config: dict[str, int], rng, length: Length) -> tuple[list[dict[str, int]], list]:
+def _own(block: Block, config: Mapping[str, int], rng, length: Length) -> tuple[list[dict[str, int]], list]:
     """The block's own hard cases, and those for who has patience; a port that they leave out is 0.
 
     The patient see the own ones twice, without a reset too: a counter gets to its end in no other way.
@@ -98,7 +99,7 @@ def _own(block: Block, config: dict[str, int], rng, length: Length) -> tuple[lis
     return [still | row for row in own], [still | row for row in patient]
 
 
-def _strobed(block: Block, config: dict[str, int], rng, length: Length) -> Samples:
+def _strobed(block: Block, config: Mapping[str, int], rng, length: Length) -> Samples:
     """For a block that gets a sample now and then."""
     ports = block.ports(config)
     own, patient = _own(block, config, rng, length)
@@ -135,7 +136,7 @@ def _alike(block: Block, ports: tuple[Port, ...], rng: np.random.Generator, coun
         yield Sample(row | held)
 
 
-def _edges(block: Block, config: dict[str, int], own: list[dict[str, int]], rng, count: int) -> Samples:
+def _edges(block: Block, config: Mapping[str, int], own: list[dict[str, int]], rng, count: int) -> Samples:
     """Both sides of places where one LSB of an input matters: where a rounding turns, a comparison, or a limit begins.
 
     They are found by halving what lies between two samples.  Some follow one another without other changes: what the
@@ -154,7 +155,7 @@ def _edges(block: Block, config: dict[str, int], own: list[dict[str, int]], rng,
             state = yield Sample(row, SELDOM)
 
 
-def _clocked(block: Block, config: dict[str, int], rng, length: Length) -> Samples:
+def _clocked(block: Block, config: Mapping[str, int], rng, length: Length) -> Samples:
     """For a block whose sample is the clock."""
     ports = block.ports(config)
     own, patient = _own(block, config, rng, length)

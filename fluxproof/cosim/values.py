@@ -1,15 +1,16 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Numbers for the samples of a bench: random ones of every size, and ones at which something in the block changes."""
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 
 from golden_model.block import Port
 
 
-@lru_cache(maxsize=None)
+@cache
 def corner_values(port: Port) -> list[int]:
     """Both ends of the legal range, and around zero where it is signed."""
     return sorted({v for v in (port.low, -1, 0, 1, port.high) if port.low <= v <= port.high})

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The converted core behind a C interface, so that Python can run millions of clocks per second.
 //
 // One source for every set of generics: cosim/verilator.py writes ports.inc with a line

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The converted core, compiled by Verilator into a library: the RTL, bit by bit, at millions of clocks/s.
 
     core = VerilatedCore({"CARRIER_HALF": 10000})

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The RTL, converted to Verilog and compiled, as a device of the closed loop (cosim/closed_loop.py).
 
 Fast enough for the full ratio of 200 MHz to 10 kHz: 20,000 clocks a period.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Turns the converted Verilog into a library, by Verilator and the C++ compiler; built once per state of its sources.
 
 ``verilated.VerilatedCore`` runs what ``build`` makes.

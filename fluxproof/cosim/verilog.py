@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Converts the core to one Verilog file, by GHDL 5 or newer only: ``make verilog``.
 
 GHDL 2 converts without a complaint and wrongly (a signed ``shift_right`` loses its sign), so the version is
@@ -72,7 +73,7 @@ def find_ghdl() -> tuple[Path, str]:
     own = ROOT / ".cache" / "ghdl5" / "bin" / "ghdl"
     for candidate in (own, shutil.which("ghdl"), shutil.which("ghdl-mcode")):
         version = ghdl_version(candidate) if candidate else ""
-        if version and int(version.split(".")[0]) >= OLDEST_GHDL:
+        if candidate and version and int(version.split(".")[0]) >= OLDEST_GHDL:
             return Path(candidate), version
         seen += [version] if version else []
     raise NoUsableGhdl(
@@ -167,7 +168,7 @@ def generic(text: str) -> tuple[str, int]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("generics", nargs="*", type=generic, metavar="NAME=VALUE", help="generics of the top")
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "verilog", help="folder to write to")
     arguments = parser.parse_args()

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """``fluxproof diagnose``: why a recording differs from its simulation, as a command.
 
 Progress goes to stderr, the answer to stdout, the files to --out.  The exit status is 0 whatever the verdict, and 2

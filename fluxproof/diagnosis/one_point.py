@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One operating point: what drifts while it is held, and what a single point cannot separate.
 
 At one point a constant misfit is two numbers, which every effect with two coefficients explains.  Only its change over
@@ -98,7 +99,7 @@ def _fit(cells, before, after, sigma, held) -> Fit:
     out = held[cells.block]
     rms = lambda x, w: float(np.sqrt(2.0 * np.mean(x[rows & w] ** 2)))  # noqa: E731
     parts = [rms(x, w) for w in (~out, out) for x in (before, after)]
-    return Fit("u_dq", "V", *parts, float(np.sqrt(2.0 * np.mean(sigma[rows] ** 2))))
+    return Fit("u_dq", "V", *parts, noise_floor=float(np.sqrt(2.0 * np.mean(sigma[rows] ** 2))))
 
 
 def _spread(around, sigma) -> Fit:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The physical part of a diagnosis: from loaded recordings to effects, ambiguities and the unexplained residual."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A complete diagnosis: digital part, physics, improved drive, closed-loop comparison, output files.
 
     from fluxproof import diagnose

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The core's drive from a file whose other sections are checked too: [plant.*], [columns] and [constants].
 
 golden_model.drive.load knows the core's sections alone; the other ones belong to the diagnosis, but a mistake in them

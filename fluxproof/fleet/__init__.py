@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """``fluxproof fleet``: many recordings on all cores or a cluster, and what they say together.
 
 manifest  which recordings, of which drives

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Addresses of recordings: which are of this machine, and which protocols may be opened by whose word.
 
 An address that the user types is the user's word.  A manifest may come from a stranger: its addresses reach other
@@ -70,7 +71,7 @@ def opened(recording: str):
         return open_regular(recording)
     with _as_os_error():
         _check_target(recording)
-        return fsspec.open(recording, "rb").open()
+        return fsspec.open(recording, "rb").open()  # pyright: ignore[reportAttributeAccessIssue]  # one name: OpenFile
 
 
 def stated(recording: str) -> dict:
@@ -99,7 +100,7 @@ def matching(pattern: str) -> list[str]:
 
 def _check_target(recording: str) -> None:
     check_address(recording)
-    target = recording.split("::")[-1]
+    target = recording.rsplit("::", maxsplit=1)[-1]
     if protocol_of(target) in HERE and "*" not in target:
         open_regular(fsspec.core.strip_protocol(target)).close()  # an archive may be a FIFO, too
 
@@ -144,7 +145,7 @@ def local(recording: str):
 
 def file_name(address: str) -> str:
     """The name of an address's file, of letters that stay in a folder: the reader needs its suffix."""
-    last = re.split(r"[/\\]", address.split("::")[0].rstrip("/"))[-1]
+    last = re.split(r"[/\\]", address.split("::", maxsplit=1)[0].rstrip("/"))[-1]
     return re.sub(r"[^\w.+@ -]", "_", last)[-MOST_NAME:].lstrip(".") or "recording"
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """``fluxproof fleet``: many recordings, as a command.
 
 Progress goes to stderr, what is worth a look to stdout, the files to --out.  The exit status is 0 whatever was found,

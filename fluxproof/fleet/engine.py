@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Work on all cores of this machine or on a cluster: dask.distributed, with progress and with workers that may die."""
 
 from __future__ import annotations
@@ -8,8 +9,9 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
+from typing import Any
 
-import dask
+import dask.config
 from distributed import CancelledError, Client, KilledWorker, LocalCluster, as_completed
 from distributed.utils import LoopRunner
 
@@ -59,7 +61,9 @@ class Engine:
 
     def __init__(self, workers: int | None = None, scheduler: str | None = None, limit_s: float | None = None):
         self.workers, self.scheduler, self.limit_s = workers, scheduler, limit_s
-        self.cluster = self.client = self.runner = None
+        self.cluster: LocalCluster | None = None
+        self.client: Client | None = None
+        self.runner: LoopRunner | None = None
 
     def __enter__(self) -> Engine:
         self.settings, self.main = dask.config.set(SETTINGS), _Main()
@@ -90,14 +94,19 @@ class Engine:
         self.main.restore()
         self.settings.__exit__(None, None, None)
 
+    def _connected(self) -> Any:
+        """The client inside ``with``; Any: it is not asynchronous and answers at once, which its types do not say."""
+        assert self.client is not None
+        return self.client
+
     @property
     def dashboard(self) -> str:
         """Address of the Dask dashboard."""
-        return self.client.dashboard_link or ""
+        return self._connected().dashboard_link or ""
 
     def cores(self) -> int:
         """Threads of all workers, at least 1."""
-        return max(sum(self.client.nthreads().values()), 1)
+        return max(sum(self._connected().nthreads().values()), 1)
 
     def each(self, function: Callable, items: Iterable) -> Iterator[tuple]:
         """(item, result) in the order in which they end; an item that took its workers with it gives Lost.
@@ -114,12 +123,12 @@ class Engine:
             yield from self._ended(function, [item])
 
     def _ended(self, function, items) -> Iterator[tuple]:
-        waiting, running = iter(items), {}
+        client, waiting, running = self._connected(), iter(items), {}
         ended = as_completed(with_results=False)
 
         def more(count):
             for item in itertools.islice(waiting, count):
-                future = self.client.submit(function, item, pure=False)
+                future = client.submit(function, item, pure=False)
                 running[future.key] = item, future
                 ended.add(future)
 
@@ -128,7 +137,7 @@ class Engine:
                 found[1].cancel(force=True)
 
         more(AHEAD * self.cores())
-        with Watch(self.client, self.limit_s, give_up) if self.limit_s else contextlib.nullcontext():
+        with Watch(client, self.limit_s, give_up) if self.limit_s else contextlib.nullcontext():
             for future in ended:
                 item, _ = running.pop(future.key)
                 try:

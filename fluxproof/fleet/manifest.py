@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Which recordings there are: folders, globs, files, addresses of object stores, and manifests (CSV or Parquet).
 
 A manifest has a column ``recording`` and may have ``drive`` (drive file), ``serial``, ``time`` (ISO 8601),

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The text of a manifest, CSV or Parquet: its columns and its lines; each mistake names line and column.
 
 CSV is UTF-8, or UTF-16 with a byte-order mark, and separated by comma, semicolon or tab.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """fleet.html: one file, no script, nothing loaded; the style is that of the diagnosis' report."""
 
 from __future__ import annotations
@@ -152,7 +153,8 @@ def recordings(design: Design) -> list[dict]:
     grouped = {name for g in design.groups for name in g.recordings}
     out = []
     for row, weighed in zip(design.rows, design.weighed, strict=True):
-        extras = sorted((e for e, p in weighed.present.items() if p >= 0.5), key=lambda e: -weighed.present[e])
+        present = {} if weighed is None else weighed.present
+        extras = sorted((e for e, p in present.items() if p >= 0.5), key=lambda e: -present[e])
         worth = row["serial"] in notable or row["recording"] in grouped or bool(signature(weighed))
         view = {
             **link(row),

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Pictures of fleet.html: verdicts, a parameter over the population, a drift, the signature of a group."""
 
 from __future__ import annotations

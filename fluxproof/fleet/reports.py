@@ -1,7 +1,9 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The report of one recording of a fleet, made when somebody asks for it."""
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import threading
 import webbrowser
@@ -72,7 +74,5 @@ def serve(entries: list[Entry], out: Path) -> None:
         address = f"http://127.0.0.1:{running.server_port}/{PAGE}"
         print(f"{address}  (Ctrl-C ends)", flush=True)
         webbrowser.open(address)
-        try:
+        with contextlib.suppress(KeyboardInterrupt):
             running.serve_forever()
-        except KeyboardInterrupt:
-            pass

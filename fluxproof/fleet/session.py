@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A run over a fleet: keys, what is done already, the rest on the engine, the table, the findings, the page."""
 
 from __future__ import annotations

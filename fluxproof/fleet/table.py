@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Rows on disk: OUT/rows/KEY.parquet, each written whole or not at all, and OUT/fleet.parquet made of them.
 
 The key is a hash of what a row follows from, so that a later run finds what is done and does again what changed.
@@ -6,6 +7,7 @@ The key is a hash of what a row follows from, so that a later run finds what is 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -46,7 +48,8 @@ class Rows:
     def read(self, key: str) -> dict | None:
         """The row, or None if its file is missing or damaged, which is then removed."""
         try:
-            return pq.read_table(self.path(key), memory_map=False, partitioning=None).to_pylist()[0]
+            options: dict[str, Any] = {"memory_map": False, "partitioning": None}
+            return pq.read_table(self.path(key), **options).to_pylist()[0]
         except FileNotFoundError:
             return None
         except (OSError, ValueError, IndexError):

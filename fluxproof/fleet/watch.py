@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The limit of time of each item: who runs longer loses its worker process, whatever blocks it."""
 
 from __future__ import annotations
@@ -7,6 +8,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable
+from typing import Any
 
 from distributed import Client
 
@@ -28,7 +30,9 @@ class Watch(threading.Thread):
 
     def __init__(self, client: Client, limit_s: float, give_up: Callable[[str], None]):
         super().__init__(daemon=True)
-        self.client, self.limit_s, self.give_up = client, limit_s, give_up
+        # Any: a client that is not asynchronous answers at once, which its types do not say.
+        self.client: Any = client
+        self.limit_s, self.give_up = limit_s, give_up
         self.since: dict[tuple[str, str], float] = {}  # when a (worker, key) was first seen to run
         self.doomed: set[str] = set()  # workers that are to be killed, until they are gone
         self.ended = threading.Event()

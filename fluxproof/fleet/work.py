@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One recording becomes one row: in any process of any machine, in any order, the same row."""
 
 from __future__ import annotations

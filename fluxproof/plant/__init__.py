@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Float physics of the drive: machine, shaft, inverter and sensors, in SI units.
 
 Amplitude-invariant Clarke, d axis at the electrical angle theta, motor

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Averaged plant: one voltage vector per period, from the duties and the inverter's voltage errors."""
 
 from fluxproof.plant import layout as L

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Python side of the plant: functions that build parameters and states, and two convenience classes.
 
 Loops that need speed call the kernels `advance_averaged` and `advance_switching`

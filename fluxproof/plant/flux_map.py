@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Gridded flux maps: psi_d(i_d, i_q), psi_q(i_d, i_q) and their inverse.
 
 Interpolation is bicubic (Catmull-Rom): it passes through the grid points and

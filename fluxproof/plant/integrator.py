@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Equations of motion of machine and shaft, and the Runge-Kutta step.
 
 Stator frame, flux linkage as state (a constant voltage vector then integrates

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Two-level inverter legs, as Thevenin sources seen by the machine.
 
 Current is positive out of the leg.  A leg is a voltage source v and a slope

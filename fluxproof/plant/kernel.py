@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Common parts of both plants: parameters, outputs, and a step of the whole drive."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Layout of the plant's state vector: one float64 array per drive.
 
 The first block is the true state and the inputs that vary slowly, the second

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Shaft: inertia, viscous and Coulomb friction with stiction, load or imposed speed.
 
 J dw/dt = T_airgap - T_load - B w - T_c sign(w)          (free)

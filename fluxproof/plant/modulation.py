@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Centre-aligned gate signals with dead time: a reference source for the switching plant."""
 
 import numpy as np

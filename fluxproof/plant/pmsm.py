@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Permanent-magnet synchronous machine: description and magnetic model.
 
 Flux linkage is the state; currents follow from it.  The functional magnetic

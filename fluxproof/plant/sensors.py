@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Sensors: current and bus-voltage converters, position sensor, seeded noise.
 
 Noise is a hash of (seed, channel, sample number): any sample can be repeated

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Switching plant: piecewise-constant gates, diodes, legs that float at zero current.
 
 Between two edges every leg is in one of three modes: conducting with positive

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Clarke and Park transforms, amplitude invariant, alpha on phase a."""
 
 import math

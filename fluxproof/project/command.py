@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The subcommand ``fluxproof project drive.toml --part PART --out DIR``."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the parts of Xilinx's families need: processor, largest clock, addresses, interrupts."""
 
 from __future__ import annotations

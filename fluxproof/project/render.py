@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The text of each file of a project, from a drive and its registers."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """``fluxproof simulate``: a drive as its drive.toml describes it, in closed loop with the golden core, and a report.
 
 scene      what happens when: start, speed step, load step, reversal

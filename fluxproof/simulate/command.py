@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The subcommand ``fluxproof simulate drive.toml [--out DIR]``: report.html and simulation.json.
 
 Exit status: 0 stable and settled without a trip, 1 otherwise, with the reason in one line on stderr.

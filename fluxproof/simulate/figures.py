@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The numbers of a simulation: what the runs show, and what follows from the drive's data alone.
 
 Every figure is {"value", "unit", "from"}: ``from`` says whether it was measured in the run or calculated.  None where

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Phase and gain margins of the current and the speed loop, in the z domain with the core's own equations.
 
 Current loop of an axis, sample time T, a = exp(-R*T/L):

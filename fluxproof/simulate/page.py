@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The HTML report of a simulation: one file, no script, nothing loaded; the style is the diagnosis' report's."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The pictures of a simulation's report, in the style of the diagnosis' report."""
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ def speed(drive: Drive, run: Run) -> theme.Picture:
 
 def currents(drive: Drive, run: Run) -> theme.Picture:
     """Currents in the rotor frame with the reference and the limit."""
-    figure, panels = theme.axes(2, 1, height=3.6, sharex=True)
+    figure, panels = theme.panels(2, 1, height=3.6, sharex=True)
     _lines(panels[0], run, (run["i_q"], theme.AFTER, "-"), (run["i_q_ref"], theme.BEFORE, "--"))
     for side in (-1, 1):
         panels[0].axhline(side * drive.current_limit_a, color=theme.AXIS, linewidth=0.8, linestyle=":")
@@ -123,7 +124,7 @@ def ripple(rippled: dict) -> theme.Picture:
 
 def bode(loops: dict[str, Loop]) -> theme.Picture:
     """Gain and phase of the open loops."""
-    figure, panels = theme.axes(2, 1, height=3.6, sharex=True)
+    figure, panels = theme.panels(2, 1, height=3.6, sharex=True)
     shown = [(name, loops[name], color) for name, color in _colors(loops)]
     for _, loop, color in shown:
         hz = loop.frequencies()

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The current inside PWM periods, between the samples of a run.
 
 The samples lie in the valley, where the ripple is near zero.  Some periods of a run are therefore computed again from
@@ -34,6 +35,7 @@ def ripple(drive: Drive, run: Run, end: int, span: int) -> dict:
         if size > worst:
             worst, shown = size, (t, i_abc)
     rms = float(np.sqrt(np.mean(squares)))
+    assert shown is not None  # PERIODS is positive
     return {"t": shown[0], "i_abc": shown[1], "peak_to_peak_a": worst, "rms_a": rms}
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Runs of the golden core on the switching plant, with the drive's own dead time and device drops."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The scene that a drive is put through, chosen from its own data: what it can reach, and how long its loops take.
 
 Speeds are mechanical, [rad/s]; currents peak values.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One simulation from a drive to its data and its page."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Whether the drive may be built as described, in one line; and what the simulation does and does not contain."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One asynchronous pin: synchroniser, then a filter that accepts a level only after it has stayed for a while.
 
 Two registers synchronise the pin to the clock.  A level other than the output's is accepted when it has been there for

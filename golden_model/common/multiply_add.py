@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The arithmetic that most equations of the core consist of: multiply, add, round, saturate.
 
     y = saturate(c + round_half_up(a*b, DROP))        multiply_add

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Square root by table and chord, never above the true root.
 
     x = mantissa * 4**-shift, mantissa in [1/4, 1)

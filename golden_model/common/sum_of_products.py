@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Two products that are added or subtracted, as a rotation or a cross product needs them.
 
     y = saturate(round_half_up(c*d + a*b, DROP))      sum_of_products

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The speed that belongs to the chord of the flux, because the voltage vector is constant during a sample.
 
     omega_chord = omega_me - k_chord*omega_me**3          k_chord = t_s**2/24

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Keeps the current references in the circle of radius i_max, d axis first, whatever the source of the references.
 
     i_d     = limit(i_d_ref, +-i_max)

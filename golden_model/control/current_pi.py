@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Current regulators of both axes.
 
     err   = i_ref - i

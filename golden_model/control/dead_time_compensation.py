@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The compensation voltage for dead time and device drops, in the stator frame: paper 000, section V.B.
 
     u_comp_alpha = v_comp*s_alpha

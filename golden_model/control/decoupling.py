@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Rotational voltages, the last term of paper 001 eq. (2), added to the current regulators' outputs.
 
     u_dec_d = -omega_chord*lambda_q

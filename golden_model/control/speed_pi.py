@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Speed regulator: from speed error to i_q reference, limited, with conditional integration.
 
     err     = omega_ref - omega_me

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Adds decoupling and dead-time compensation and keeps the voltage inside the circle of radius u_max, d axis first.
 
     limit = min(u_max, room),  u_d = limit(u_pi_d + u_dec_d + u_comp_d, +-limit)

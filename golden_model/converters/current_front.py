@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The converters of a board from their pins to the four codes of a sample, of the kind that is built.
 
     currents  0  codes from elsewhere    1  SPI    2  XADC    3  delta-sigma

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Four delta-sigma modulators to codes: their bits, a sinc3 each, and fast overcurrent of the three phases, wired.
 
 Nothing is computed here.  Modulators 0 to 3 are a, b, c and the bus.  All filters see the same strobes, so the codes

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Bits of delta-sigma modulators: makes their clock, or follows one, and registers their data; one step is one clock.
 
 * ``follow_clock`` = 0: ``mod_clock`` has a period of ``mod_ratio`` clocks, high for the first half (rounded down).

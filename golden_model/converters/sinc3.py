@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Third-order sinc filter of a delta-sigma modulator's bits, one result for each trigger; one step is one clock.
 
     acc_1 += weight*bit;  acc_2 += acc_1;  acc_3 += acc_2          at every bit, each from the values before
@@ -134,7 +135,7 @@ def gain_of(oversampling):
     return GAIN.to_int(FULL / (oversampling**3 * weight_of(oversampling)))
 
 
-def centred(period_clocks, oversampling, bit_clocks, bit_delay=0):
+def centred(period_clocks: int, oversampling: int, bit_clocks: int, bit_delay: float = 0):
     """Register ``start_clocks`` that puts the window's middle on the next trigger.
 
     ``period_clocks``: distance of the triggers; ``bit_clocks``: of two bits; ``bit_delay``: from the middle of the

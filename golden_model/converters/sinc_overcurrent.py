@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Short third-order sinc filter of a modulator's bits for fast overcurrent alone; one step is one clock.
 
     acc_1 += bit;  acc_2 += acc_1;  acc_3 += acc_2         at every bit, each from the values before

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Master for SPI converters: spi_frame clocks the frame, spi_words makes codes of its bits; one step is one clock.
 
 Each ``sample_trigger`` is answered by ``codes_valid`` with all codes, or by ``frame_error``.  See spi_frame for the

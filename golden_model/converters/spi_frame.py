@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The frame of SPI converters: start, chip select, clock, and when a bit is taken; one step is one clock.
 
 A trigger starts a conversion and one frame; ``words_complete`` of spi_words or ``frame_error`` answers each trigger.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Bits of SPI converters to codes, several data lines in parallel, one or two words on each; one step is one clock.
 
 ``bit_taken`` takes a bit of every line: the level of its pin two clocks before.  The lines are not synchronous and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The third phase current where two phases have a sensor: i_missing = -(i_x + i_y); a sample block.
 
 ``missing``: 0 all three phases have a sensor, 1, 2, 3: phase a, b, c has none.  It works on currents, after

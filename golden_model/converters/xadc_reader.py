@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Reads channels of the XADC (or SYSMON) of a Xilinx FPGA through its DRP; one step is one clock, which is DCLK.
 
     trigger -> ``conversions`` times (convst, eoc) -> ``channels`` times (den with daddr, drdy with drp_do) -> codes

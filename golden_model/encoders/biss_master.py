@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Master for an absolute encoder with BiSS-C: clock, acknowledge, start bit, word, status, CRC, position code.
 
 ``start`` begins a frame: ``serial_clock`` (MA) runs until the last bit has come.  The encoder answers on SLO: low as

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Speed of an incremental encoder from the time between its edges, at every speed by the same equation.
 
     omega_me = k_edge * (counts between two edges) / (clocks between these edges)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Master for an absolute encoder with EnDat 2.1 or 2.2: mode command, start bit, errors, word, CRC, position code.
 
 ``start`` begins a frame.  ``serial_clock`` falls; the encoder latches its position.  For two periods and the six of

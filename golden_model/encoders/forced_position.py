@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A position that the host gives, standing or turning, in place of the encoder's: for commissioning.
 
     place(k) = forced_angle + travelled(k);  travelled(k) = travelled(k-1) + forced_rate while position_source stays 1

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Three Hall sensors to the coarse electrical angle, to steps of a sixth turn and to the start of an encoder.
 
 Forward, (a, b, c) = 101, 100, 110, 010, 011, 001 are the sectors 0 to 5; ``hall_reverse`` = 1 counts them the other way

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Three Hall sensors from their pins to a code and a speed: three filters, hall_decoder and edge_timer, wired.
 
 Nothing is computed here.  ``sample_trigger`` latches the upper bits of theta_hall as the code of a sensor alone, with

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """An incremental encoder from its pins to code and speed: three filters, decoder, counter, index and edge timer, wired.
 
 Nothing is computed here.  The blocks are one register apart, as in the VHDL: a step reaches the counter and the timer

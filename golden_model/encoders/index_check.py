@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The count at each index of an incremental encoder: the first one refers it, later ones find and mend lost counts.
 
     off = count + pending at the index, the shorter way round; it should be 0

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A position code for each sample from an absolute encoder: delay compensated, bad frames bridged, then a trip.
 
     good frame since the last sample:  place(k) = code,  delta(k) = code - place(k-1)
@@ -99,7 +100,7 @@ def stimuli(rng, config):
         rows.extend(still | writes for _ in range(clocks))
 
     place = 0
-    for k in range(6):
+    for _ in range(6):
         run(1, sample=1, bridge_max=4)
         run(TAKES, bridge_max=4)
     run(1, clear_faults=1)

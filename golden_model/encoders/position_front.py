@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The position of a board from its pins: the front end of one kind of encoder, and what the core needs of it.
 
     encoder   0  external code    1  A/B/Z    2  Hall    3  A/B/Z started by Hall    4  SSI    5  BiSS-C    6  EnDat

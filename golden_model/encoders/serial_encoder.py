@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """An absolute encoder from its lines to a code for each sample: the master of its protocol and the bridge, wired.
 
 Nothing is computed here.  A frame starts with ``sample_trigger``; the bridge's sample is the strobe of the converters'

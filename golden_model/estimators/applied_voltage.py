@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The voltage commanded to the inverter for the coming period, in the stator frame.
 
     u_applied_alpha = (2*compare_a - compare_b - compare_c) / (3*CARRIER_HALF)       * u_dc

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The voltage at the motor's terminals: the commanded voltage minus the voltage loss of the inverter's legs.
 
     u_clean_alpha = u_applied_alpha - v_leg*s_alpha(k-1)

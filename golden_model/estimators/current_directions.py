@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Predicted directions of the phase currents when the next sample's voltage acts: paper 000 eq. (6).
 
     turn = k_ahead*omega_me                                     rotation during 2.5 samples, in radians

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Flux linkages from currents by the linear magnetic model, paper 001 eq. (6), with the correction of eq. (16).
 
     lambda_c_d = l_d*i_d + lambda_mg + lambda_add_d = model_d + lambda_add_d

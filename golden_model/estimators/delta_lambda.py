@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The error of the flux estimate, from the integrals of the current regulators: paper 001 eq. (15).
 
     delta_lambda_d =  (u_int_q - r*i_q) / omega_me

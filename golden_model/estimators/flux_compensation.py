@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The compensation from delta_lambda: the PI of paper 001 eq. (17), or the plain addition of eq. (16).
 
     integral += flux_ki*delta_lambda       or, while delta_lambda is held, -integral/2**8

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The estimated flux linkages, paper 001 eq. (17): one of the two models plus the compensation.
 
     lambda_d = merged_d + lambda_pi_d      if the voltage is known and flux_mode selects the merge (``merged`` = 1)

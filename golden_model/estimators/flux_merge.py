@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Merge of the voltage and current models in the stator frame: paper 001 eq. (7), without a pure integrator.
 
 Continuous, with the error eps = lambda_c - lambda of the current model against the merged flux:

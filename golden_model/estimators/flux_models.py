@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The flux linkages of this sample by both models, for flux_estimate and current_model.
 
     model_d  = l_d*i_d + lambda_mg      the linear magnetic model, paper 001 eq. (6)

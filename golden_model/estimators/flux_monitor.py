@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Latches the conditions that disturb the flux estimate, until they are cleared.
 
 One bit per condition, set by a single sample and cleared by ``clear_faults`` unless the condition persists:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Adaline of the magnet flux, paper 000 eq. (13), extended to any i_d and salient motors.
 
     e      = u_q - v_leg*d_q - r*i_q - omega*(l_d*i_d + psi_m)          eq. (7b); l_d*i_d is zero in eq. (11)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """1/omega_me for delta_lambda, fading out towards standstill: no divider in the sample path.
 
     factor * 2**n = weight/omega_me

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Estimated torque, paper 001 eq. (4): torque = 3/2*p*(lambda_d*i_q - lambda_q*i_d).
 
     torque = lambda_d*i_q - lambda_q*i_d        per unit of 3/2*p*lambda_base*I_base

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Adaline of V_dead, paper 000 eq. (10), and the minimisation of its Fig. 4(a).
 
     lp_u += k_lp*(u_pi_d - lp_u),  u_h = u_pi_d - lp_u             Fig. 3: harmonics in the regulator output

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The winding resistance from its temperature, paper 000 eq. (12), and the resistive flux drop of half a sample.
 
     r   = r_s + tcr*(temp_winding - t_0)        R = R_0 + TCR*(T_2 - T_0)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Faults of the front ends by name, which trip the core; runs at every clock.
 
     0  index_wrong      the index of the encoder was off by more than correct_max counts

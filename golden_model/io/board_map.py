@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The registers of a board's front ends: a second block of addresses behind the core's, from BASE on.
 
 As in register_map: an address is one entry here and never changes; formats, ranges and meanings come from the ports of

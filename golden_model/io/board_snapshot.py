@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the encoder and the converters said at one sample, for software to read word by word.
 
 ``take_snapshot`` asks for it; the next ``sample_valid`` takes all values at once and sets ``snap_ready``.  They stay

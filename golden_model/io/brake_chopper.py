@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Switches the brake resistor with hysteresis on the bus voltage: what a braking motor returns is turned into heat.
 
     brake = 1 from u_dc >= brake_on until u_dc < brake_off;  brake_on = 0: no chopper

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """ADC codes to phase currents: i_x = gain_x * (code_x - offset_x).
 
 Formats: codes of 12 to 16 bits are left-aligned in 16 bits, so that offset and gain do not depend on

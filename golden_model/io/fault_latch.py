@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Latches the faults and the first fault, and keeps the gates off until ``clear_trip``; runs at every clock.
 
     0 to 5   faults of a sample, see sample_checks

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Whether the host still writes: no write for ``heartbeat`` sample times is a fault; runs at every clock.
 
     age = sample times (``period``) since the last write, counted up to heartbeat

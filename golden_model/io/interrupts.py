@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The interrupt: causes that software clears, and a mask; runs at every clock.
 
     cause 0  a trip is latched (tripped)

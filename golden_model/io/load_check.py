@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Whether the motor is connected: current in all three phases while the regulator asks for some.
 
     asked = run = 1 and |i_q_ref| >= 2*i_open

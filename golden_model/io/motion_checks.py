@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Plausibility of the motion, one bit each, evaluated with every sample after the speed regulator.
 
     0  overspeed   |omega_me| >= omega_trip

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The zero of the current sensors: mean of each phase's current while the gates are off and the shaft stands.
 
     mean_x = sum of WINDOW samples of i_x / WINDOW;   current_offset = |mean_x| >= offset_max in any phase

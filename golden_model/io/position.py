@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Resolver or encoder code to electrical angle: theta_me = pole_pairs * code + theta_offset, modulo one turn.
 
 Formats: a code of 8 to 18 bits is left-aligned in 18 bits.  Nothing is rounded; every operation is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The registers behind the bus, one transaction at a time: twin of generated/register_file.vhd and register_access.vhd.
 
 A write takes effect or is refused as a whole; the response says which (OKAY, SLVERR, DECERR of AXI4).  The RTL decides

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The register map for software: one fixed address for every register, command and status value.
 
 The address of a register is one entry in ``_SETTINGS``; ``registers()`` raises an error for a register without one.
@@ -19,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from itertools import pairwise
 
 from golden_model import fluxproof
 from golden_model.block import Port
@@ -232,7 +234,7 @@ def registers(settings: Mapping[str, Port] = fluxproof.REGISTERS) -> dict[str, R
     The reset value of a register is zero, or the legal value closest to zero: gains zero, gates off.
     """
     ordered = sorted(_read_only() + _writable(settings), key=lambda r: r.address)
-    for before, after in zip(ordered, ordered[1:]):
+    for before, after in pairwise(ordered):
         if before.address == after.address:
             raise ValueError(
                 f"register map: {before.name} and {after.name} share address {after.address:#05x}"

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Plausibility checks of a raw sample, one bit each, evaluated with every sample.
 
     0  overcurrent    |i_x| >= i_trip in any phase

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Rejects raw samples that come too early, and reports missing ones; runs at every clock.
 
 * A strobe less than ``INTERVAL`` clocks after the last accepted one is rejected (``sample_busy``): the sample in flight

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The sample of the core: when both the codes of the converters and the position of a trigger are there.
 
     sample_valid = the later of codes_valid and position_done since the last sample_trigger

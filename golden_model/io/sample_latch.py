@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Latches one raw sample, the references and the run state, so that they are constant while it is processed.
 
 Everything that may change at any clock (converter codes, position, references, the gates' running
@@ -102,7 +103,7 @@ BLOCK = Block(
     outputs=tuple(_PORTS[out] for out in NAMES.values()),
     latency=1,
     configs=({"ADC_BITS": 16, "POSITION_BITS": 16}, {"ADC_BITS": 12, "POSITION_BITS": 18}),
-    width_from={k: sized(out) for name, out in NAMES.items() for k in (name, out) if sized(out)},
+    width_from={k: size for name, out in NAMES.items() for k in (name, out) if (size := sized(out))},
     reference=reference,
     bound=bound,
 )

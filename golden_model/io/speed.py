@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Speed from two consecutive position codes, then a first-order filter.
 
     raw(k)   = k_speed * wrap(code(k) - code(k-1))

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """An AXI4-Stream packet for every sample: inputs of the core, its results, and the sample number.
 
 The words of a packet (telemetry_words) are read from the core's live values, delayed by one clock: one word per clock,
@@ -141,7 +142,7 @@ BLOCK = Block(
     ),
     too_wide=(0,),
     width_from={
-        name: sample_latch.sized(out) for name, out in sample_latch.NAMES.items() if sample_latch.sized(out)
+        name: size for name, out in sample_latch.NAMES.items() if (size := sample_latch.sized(out))
     },
     reference=None,
     bound=None,

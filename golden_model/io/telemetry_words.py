@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The telemetry packet: the layout of its words; one word per clock, read from the core's live values.
 
 ``WORDS`` is the only definition of the packet.  The VHDL twin is generated from it; the reader of a capture and
@@ -198,7 +199,7 @@ BLOCK = Block(
     latency=2,
     constants={"COUNT": COUNT, "START": START, "INDEX_W": INDEX.width},
     configs=({"ADC_BITS": 16, "POSITION_BITS": 16}, {"ADC_BITS": 12, "POSITION_BITS": 18}),
-    width_from={name: sized(name) for name in INPUTS if sized(name)},
+    width_from={name: size for name in INPUTS if (size := sized(name))},
     reference=None,
     bound=None,
     stimuli=stimuli,

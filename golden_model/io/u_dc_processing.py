@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """U_dc as 2**n / m, so that the modulator multiplies instead of dividing.
 
     inverse      = 1 / u_dc = m * 2**n * 2**-17            m and n: see common/reciprocal

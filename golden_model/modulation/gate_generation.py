@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Up-down carrier, six gate signals with dead time, enable and latched trip; one step is one clock.
 
 The carrier counts 0 .. CARRIER_HALF-1 and back, each value once per direction: 2*CARRIER_HALF clocks.
@@ -151,7 +152,7 @@ def stimuli(rng, config):
             2: [0, half, half // 2], 3: [half, 0, half], 4: [1, half - 1, 0], 28: [half - 8, half - 9, half - 12],
         }.get(period, compare)  # fmt: skip
         for clock in range(2 * half):
-            row = dict(zip(("compare_a", "compare_b", "compare_c"), compare, strict=True), **settings)
+            row = {**dict(zip(("compare_a", "compare_b", "compare_c"), compare, strict=True)), **(settings or good)}
             row |= {"enable": int(period != 12 or clock < half // 3), "trip": 0, "clear_trip": 0}
             row["double_update"] = int(period == 15)  # while the gates are on: not taken
             if period in (6, 9):

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Duties to compare values of the carrier: compare = duty * CARRIER_HALF, short pulses dropped.
 
 A leg is high for 2*compare clocks in the middle of a period and low for CARRIER_HALF - compare at either

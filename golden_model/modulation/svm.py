@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Symmetrical space-vector modulation: stator voltage to three duties, without a divider.
 
     x = u_alpha/u_dc,  y = sqrt(3)/2*u_beta/u_dc          by inverse and inverse_beta of u_dc_processing

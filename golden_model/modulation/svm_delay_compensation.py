@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Angle at which the voltage will act: theta_out = theta_me + k_delay*omega_me, modulo one turn.
 
 A duty computed from the samples of one period acts during the next, on average 1.5 sample times after

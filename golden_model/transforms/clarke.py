@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Three phase currents to the stator frame, amplitude-invariant; no zero-sum is assumed.
 
     i_alpha = (2*i_a - i_b - i_c) / 3

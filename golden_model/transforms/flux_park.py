@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Merged flux linkage to the rotor frame: the rotation by -theta_me, in FLUX.
 
     lambda_m_d =  lambda_m_alpha*cos_theta + lambda_m_beta*sin_theta

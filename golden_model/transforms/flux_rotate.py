@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Rotates a flux linkage by the angle whose sine and cosine are given, with two multipliers in two clocks.
 
     out_y = x*sin_theta + y*cos_theta

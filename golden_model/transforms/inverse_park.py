@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Rotor frame to stator frame: the rotation by theta.
 
     u_alpha = u_d*cos_theta - u_q*sin_theta

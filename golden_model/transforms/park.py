@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Stator frame to rotor frame: the rotation by -theta_me.
 
     i_d =  i_alpha*cos_theta + i_beta*sin_theta

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Rotates a vector by the angle whose sine and cosine are given.
 
     out_x = x*cos_theta - y*sin_theta

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Sine and cosine of two angles, one after the other, from an interpolated quarter-wave table of 1024 entries.
 
     theta = quadrant + (address + 1/2)/4096 + delta          turns, |delta| < 2**-13

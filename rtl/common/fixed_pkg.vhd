@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the two narrowing operations of the core, twin of golden_model/fixed.py.
 -- Rounding: half up (add half an output LSB, then floor).  Overflow: saturation.
 -- A block that floors uses shift_right or a slice, a block that computes modulo a slice; its comments say so.

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: one asynchronous pin: synchroniser, then a filter that accepts a level only after it has stayed for a while.
 -- Two registers (ASYNC_REG) synchronise the pin to clk.  A level other than the output's is accepted when it has been
 -- there for filter_clocks + 1 clocks without a break: a pulse of filter_clocks clocks or fewer has no effect.

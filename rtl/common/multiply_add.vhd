@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the arithmetic that most equations of the core consist of, in one DSP48 with all of its registers.
 --   y = saturate(c + round_half_up(a*b, DROP)),  with MINUS = 1:  saturate(c - round_half_up(a*b, DROP))
 --   limited: y is saturated

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: a FIFO in block RAM for an AXI4-Stream: accepts one word per clock, outputs one when the sink is ready.
 -- room = 1: the FIFO has space for a whole packet of PACKET words.  A writer that checks it before the first word
 -- never waits and never breaks off a packet.  A word written to a full FIFO is ignored.  out_data and out_last

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: 1/x as m * 2**n, one quotient bit per clock, outside the data path.
 --   1/x = m * 2**n * 2**-17, m in (2**16, 2**17), n in 0..N_MAX
 -- Method: n shifts bring x into [1, 2), first by multiples of four, then by the remainder; m is the quotient.

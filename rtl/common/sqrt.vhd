@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: square root by table and chord, never above the true root.
 --   x = mantissa * 4**-shift, mantissa in [1/4, 1);  root = (BASE + SLOPE*rest) * 2**-shift
 -- Formats: x U(0,32); mantissa cut to 20 bits, 8 of address and 12 of rest; base, slope U(0,18); root U(0,16).

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: two products that are added or subtracted, in two DSP48 with registers at operands and products.
 --   y = round_half_up(c*d + a*b, DROP),  with minus = '1':  round_half_up(c*d - a*b, DROP)
 -- Formats: y has DROP fraction bits less than the products; the sum fits the 48 bits of the adder.

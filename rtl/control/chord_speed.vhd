@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the speed that belongs to the chord of the flux, because the voltage vector is constant during a sample.
 --   omega_chord = omega_me - k_chord*omega_me**3
 --   square = 4*omega_me*omega_me,  part = 8*square*k_chord,  shorter = part*omega_me,  each cut by the same 20 bits

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: keeps the current references in the circle of radius i_max, d axis first, whatever their source.
 --   i_d     = limit(i_d_ref, +-i_max)
 --   i_q_max = floor(sqrt((i_max - i_d)*(i_max + i_d))), the limit of i_q in speed mode and in torque mode

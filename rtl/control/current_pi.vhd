@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: current regulators of both axes.
 --   err = i_ref - i;  u_pi = kp*err + int
 --   int += ki*err unless the voltage was at its limit and err pushes further

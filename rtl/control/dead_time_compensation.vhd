@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: compensation voltage for dead time and device drops, stator frame, paper 000 section V.B.
 --   u_comp_alpha = v_comp*s_alpha;  u_comp_beta = v_comp*s_beta
 -- One pipeline for both components: alpha, then beta a clock later.

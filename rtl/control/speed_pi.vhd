@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: speed regulator, from speed error to i_q reference, limited, with conditional integration.
 --   i_q_max is what current_limit leaves beside i_d
 --   err = omega_ref - omega_me;  u = speed_kp*err + integral;  i_q_ref = limit(u, +-i_q_max)

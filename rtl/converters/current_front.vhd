@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the converters of a board from their pins to the four codes of a sample, of the kind that is built.
 -- CURRENTS: 0 codes from elsewhere, 1 SPI, 2 XADC, 3 delta-sigma.
 -- channel_x is the code of the converter that becomes adc_x: 0 to 7 of SPI (line, and 4 more for the second word), 0 to

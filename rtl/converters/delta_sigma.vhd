@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: four delta-sigma modulators to codes: their bits, a sinc3 each, fast overcurrent of the three phases.
 -- Nothing is computed here.  Modulators 0 to 3 are a, b, c and the bus.  All filters see the same strobes, so the codes
 -- come together; one code_valid and one window_error stand for all.

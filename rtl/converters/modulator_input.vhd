@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: bits of delta-sigma modulators: makes their clock, or follows one, and registers their data.
 -- follow_clock = 0: mod_clock has a period of mod_ratio clocks, high for the first half (rounded down).  A bit is the
 -- level of its pin sample_delay clocks after the rising edge of mod_clock has left its register.

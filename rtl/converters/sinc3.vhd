@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: third-order sinc filter of a delta-sigma modulator's bits, one result for each trigger.
 --   acc_1 += weight*bit;  acc_2 += acc_1;  acc_3 += acc_2   at every bit, each from the values before
 --   total = third difference of acc_3 over four instants, oversampling bits apart

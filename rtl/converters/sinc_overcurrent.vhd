@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: short third-order sinc filter of a modulator's bits for fast overcurrent alone.
 --   acc_1 += bit;  acc_2 += acc_1;  acc_3 += acc_2     at every bit, each from the values before
 --   total = third difference of acc_3 over oversampling bits, every oversampling bits: 0 to oversampling**3

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: master for SPI converters: spi_frame clocks the frame, spi_words makes codes of its bits.
 -- Each sample_trigger is answered by codes_valid with all codes, or by frame_error.  See spi_frame for the start of
 -- the conversion, the edges, the time-out and refused settings, spi_words for the place and the sign of a code.

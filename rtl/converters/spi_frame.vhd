@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the frame of SPI converters: start of the conversion, chip select, clock, and when a bit is taken.
 -- A trigger starts a conversion and one frame; words_complete of spi_words or frame_error answers each trigger.
 -- use_convst = 1: convst is high until wait_clocks have passed and BUSY is low, then the frame starts; wait_clocks

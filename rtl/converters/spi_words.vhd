@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: bits of SPI converters to codes, several data lines in parallel, one or two words on each.
 -- bit_taken takes a bit of every line: the level of its pin two clocks before.  The lines are not synchronous and
 -- pass two registers, which settle what moves when nothing is taken; when a bit is taken they are stable, see

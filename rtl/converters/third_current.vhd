@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the third phase current where two phases have a sensor, i_missing = -(i_x + i_y).
 -- missing: 0 all three phases have a sensor, 1, 2, 3: phase a, b, c has none.  The rail flag of the missing phase is
 -- cleared, since its code is no measurement.  Currents, not codes: codes have offsets and gains of their own.

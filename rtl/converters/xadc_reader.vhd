@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: reads channels of the XADC (or SYSMON) of a Xilinx FPGA through its DRP; the clock is DCLK.
 -- trigger -> conversions times (convst, end of conversion) -> channels reads (den with daddr, drdy with drp_do) ->
 -- codes The XADC is set to event mode: convst holds the inputs at its rising edge.  In simultaneous sampling one

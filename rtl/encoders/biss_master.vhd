@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: master for an absolute encoder with BiSS-C: clock, acknowledge, start bit, word, status, CRC, position code.
 -- start begins a frame: serial_clock (MA) runs until the last bit has come.  The encoder answers on SLO: low as the
 -- acknowledge, then the start bit 1, CDS 0, the word with the highest bit first, the error and the warning bit (both 0

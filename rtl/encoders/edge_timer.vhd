@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: speed of an incremental encoder from the time between its edges, at every speed by the same equation.
 --   omega_me = k_edge * (counts between two edges) / (clocks between these edges)
 -- The edges are the last one of this sample and the last one of the latest sample that had an edge, so there is no

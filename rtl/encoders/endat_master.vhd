@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: master for an absolute encoder with EnDat 2.1 or 2.2: mode command, start bit, errors, word, CRC, code.
 -- start begins a frame: serial_clock falls and the encoder latches its position.  For two periods and the six of
 -- mode_command (highest bit first, it changes with the falling edge) this side drives the line, then it lets go.  From

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: three Hall sensors to the coarse electrical angle, to steps of a sixth turn and to the start of an encoder.
 -- Forward, (a, b, c) = 101, 100, 110, 010, 011, 001 are the sectors 0 to 5; hall_reverse = 1 counts them the other way
 -- round.  theta_hall = (sector + 1/2)/6 + hall_offset.  000 and 111 are illegal: they are counted, the last sector is

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: three Hall sensors from their pins to a code and a speed: three filters, hall_decoder and edge_timer.
 -- Nothing is computed here.  sample_trigger latches the upper bits of theta_hall as the code of a sensor alone, with
 -- pole_pairs 1; the speed is that between two sectors, with k_edge for 6 counts a turn.

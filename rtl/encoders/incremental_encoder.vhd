@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: an incremental encoder from its pins to code and speed: three filters, decoder, counter, index, edge timer.
 -- Nothing is computed here.  From a pin to the count: filter_clocks + 5 clocks, to the code one more.
 -- Formats: those of the blocks.  Latency: 1 (every clock is a sample); sample to code_theta 1, to omega_valid that of

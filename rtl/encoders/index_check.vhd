@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the count at each index of an incremental encoder: the first one refers it, later ones mend lost counts.
 --   off = count + pending at the index, the shorter way round; it should be 0
 -- The first index corrects the count at once (fast) and sets referenced; before it, start moves the count to

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: a position code for each sample from an absolute encoder: delay compensated, bad frames bridged, then trip.
 --   good frame since the last sample:  place(k) = code,  delta(k) = code - place(k-1)
 --   none:                              place(k) = place(k-1) + delta,  one more sample is bridged

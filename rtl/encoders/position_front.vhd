@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the position of a board from its pins: the front end of one kind of encoder, and what the core needs of it.
 -- ENCODER: 0 external code, 1 A/B/Z, 2 Hall, 3 A/B/Z started by Hall, 4 SSI, 5 BiSS-C, 6 EnDat.
 -- sample_trigger latches code and count, or starts a frame; position_done: code and speed are there.  The speed is that

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: A, B and Z of an incremental encoder to steps of a quarter line, direction, index and illegal transitions.
 -- A leads B forward: (a, b) = 00, 10, 11, 01 are the phases 0 to 3.  One phase on is a step up, one back a step down; a
 -- change by two phases is illegal: it gives no step and is counted in illegal_count, which saturates.

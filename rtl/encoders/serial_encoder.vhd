@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: an absolute encoder from its lines to a code for each sample: the master of its protocol and the bridge.
 -- Nothing is computed here.  A frame starts with sample_trigger; the bridge's sample is the strobe of the converters'
 -- codes, so a frame that has ended by then is this sample's.  ENCODER: 4 SSI, 5 BiSS-C, 6 EnDat.

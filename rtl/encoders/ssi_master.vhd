@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: master for an absolute encoder with SSI: clock burst, Gray or binary word, parity, position code.
 -- start begins a frame: the first falling edge of serial_clock latches the position in the encoder, each rising edge
 -- puts out a bit, the highest first, and the next rising edge takes it.  The word has word_bits bits; its lowest

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: steps to the count within a turn of counts and to the position code; corrections that do not jump.
 --   code = round((count + 1/2) * 2**POSITION_BITS / counts), modulo one turn
 -- Nothing is multiplied: code and rest are quotient and remainder of a division by 2*counts, and a step adds that of

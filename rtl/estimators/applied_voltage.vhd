@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the voltage commanded to the inverter for the coming period, in the stator frame.
 --   u_applied_alpha = (2*compare_a - compare_b - compare_c) * u_dc/CARRIER_HALF * 1/3
 --   u_applied_beta  = (compare_b - compare_c)               * u_dc/CARRIER_HALF * 1/sqrt(3)

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the voltage at the motor's terminals: the commanded voltage minus the loss of the legs.
 --   u_clean = u_applied - v_leg*s(k-1)
 -- s(k-1): the directions of the previous sample, whose voltage acts in the coming period.

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: predicted directions of the phase currents when the next sample's voltage acts, paper 000 eq. (6).
 --   turn = k_ahead*omega_me;  x = i_alpha - turn*i_beta;  y = i_beta + turn*i_alpha
 --   s_a = limit(k_sign*x, +-1)

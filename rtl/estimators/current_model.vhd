@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: flux linkages from currents by the linear magnetic model, paper 001 eq. (6), corrected by eq. (16).
 --   lambda_c_d = l_d*i_d + lambda_mg + lambda_add_d = model_d + lambda_add_d
 --   lambda_c_q = l_q*i_q             + lambda_add_q = model_q + lambda_add_q

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: error of the flux estimate, from the current regulators' integrals, paper 001 eq. (15).
 --   delta_lambda_d =  (u_int_q - r*i_q) * factor * 2**n_omega
 --   delta_lambda_q = -(u_int_d - r*i_d) * factor * 2**n_omega

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the PI of paper 001 eq. (17) on delta_lambda, or the plain addition of eq. (16).
 --   integral = limit(integral + flux_ki*delta_lambda)                                     flux_mode 3
 --   integral = integral - integral/2**8 while delta_lambda is held: an unverified compensation decays

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the estimated flux linkages, paper 001 eq. (17): one of the two models plus the compensation.
 --   lambda_d = merged_d + lambda_pi_d      if merged = 1
 --   lambda_d = model_d + lambda_pi_d       otherwise; likewise for q

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: merge of voltage and current models in the stator frame, paper 001 eq. (7).
 --   drop = rho*i;  lambda = carried - drop;  eps = lambda_c - lambda;  y = omega_0*eps;  x += omega_0*y
 --   carried = lambda_m = lambda + 2*xi*y + x + t_s*u_applied - drop

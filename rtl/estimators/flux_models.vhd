@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the flux linkages of this sample by both models, for flux_estimate and current_model.
 --   model_d  = l_d*i_d + lambda_mg,  model_q = l_q*i_q          paper 001 eq. (6)
 --   merged_d = lambda_m_d - rho*i_d;  likewise for q            eq. (11)

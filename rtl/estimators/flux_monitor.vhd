@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: latches the conditions that disturb the flux estimate, until they are cleared.
 --   flux_faults = now or (flux_faults and not clear_faults)
 --   0  a current converter at its end            4  delta_lambda at its range

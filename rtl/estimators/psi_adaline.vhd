@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: Adaline of the magnet flux, paper 000 eq. (13), with the reluctance term of eq. (7b).
 --   e = u_q - v_leg*d_q - r*i_q - omega_chord*(l_d*i_d + psi_m);  psi_m += eta_psi*omega_chord*e
 -- Held, and reported by psi_held, below omega_psi_min, while the voltage is at its limit, a converter at its end, the

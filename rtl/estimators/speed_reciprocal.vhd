@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: 1/omega_me for delta_lambda, fading out towards standstill.
 --   factor * 2**n_omega = weight/omega_me;  weight = limit((|omega_me| - omega_min)*k_ramp, 0, 1)
 -- Formats: |omega_me| U(1,16), at least 2**-12 in the reciprocal; k_ramp U(12,4), weight U(1,16), factor S(0,17).

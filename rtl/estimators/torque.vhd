@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: estimated torque, paper 001 eq. (4).
 --   torque = lambda_d*i_q - lambda_q*i_d        per unit of 3/2*p*lambda_base*I_base
 -- Formats: PU in and out; products and difference exact.

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: winding resistance from its temperature, paper 000 eq. (12), and the resistive flux drop of half a sample.
 --   r = r_s + tcr*(temp_winding - t_0);  rho = r*t_s/2;  minus_rho = -rho
 -- Without a valid reading (temp_valid = 0, or outside t_min to t_max) r = r_s and temp_lost is 1.

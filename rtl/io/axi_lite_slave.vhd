@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the handshake of an AXI4-Lite slave, one request at a time; the logic behind it decides about the request.
 --
 --   address (and data) -> request, held until answer -> response, held until the master accepts it

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: faults of the front ends by name, which trip the core.
 --   0  index_wrong      the index of the encoder was off by more than correct_max counts
 --   1  position_lost    more than bridge_max samples without a good frame of the encoder

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: what the encoder and the converters said at one sample, for software to read word by word.
 -- take_snapshot asks for it; the next sample_valid takes all values at once and sets snap_ready.  They stay until the
 -- next one is asked for, which clears snap_ready.  snap_code is the encoder's own, also while the position is forced.

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: switches the brake resistor with hysteresis on the bus voltage.
 --   brake_asked = 1 from u_dc >= brake_on until u_dc < brake_off;  brake_on = 0: no chopper
 -- It does not depend on the gates: a motor that is driven feeds the bus through the diodes.

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: ADC codes to phase currents, i_x = gain_x * (code_x - offset_x).
 -- One pipeline for the three channels: b, then c and a, each a clock later.
 -- Formats: code of ADC_BITS, left-aligned in CODE U(1,15); gain S(1,16); current PU.

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: whether the host still writes: no write for heartbeat sample times is a fault.
 --   host_lost = 1 from heartbeat periods after the last write until the next one;  heartbeat = 0: never
 -- Any write that the registers accept counts.

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the interrupt: causes that software clears, and a mask.
 --   cause 0  a trip is latched (tripped)
 --         1  a fault appeared in fault_flags, whether it trips or not

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: plausibility checks of the motion, one bit each, evaluated with every sample after the speed regulator.
 --   0  overspeed   |omega_me| >= omega_trip
 --   1  runaway     speed mode: against the reference, at omega_away or faster, and for runaway_samples samples in

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the zero of the current sensors: mean of each phase's current while the gates are off and the shaft stands.
 --   mean_x = sum of 2**WINDOW_BITS samples of i_x / 2**WINDOW_BITS;  current_offset = |mean_x| >= offset_max in any phase
 -- Evaluated after each window of consecutive samples with run = 0 and |omega_me| < omega_stall; otherwise the last

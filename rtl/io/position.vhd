@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: resolver or encoder code to electrical angle, theta_me = pole_pairs*code + theta_offset, modulo one turn.
 -- Formats: code of POSITION_BITS, left-aligned in TURN U(0,18); reverse = 1 inverts the sense of rotation.
 -- Latency: 2.  Rounding: none; every operation is modulo one turn, because angles wrap (slices drop whole turns).

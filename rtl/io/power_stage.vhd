@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the power stage's side of the AXI top: the trip pin enters here, the six gates leave through registers.
 -- trip_pin may change at any time; a pulse as short as a flip-flop can detect is enough.  It sets caught without a
 -- clock, and caught clears the gate registers without a clock: the gates go off even if clk has stopped.  Two registers

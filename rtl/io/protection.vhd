@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: everything that turns the gates off: guard of the samples, checks, watch of the host, memory of the faults,
 -- and the brake chopper beside them.  This entity only instantiates.
 --

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: decides whether a request to the registers is allowed, and when a write takes effect.
 --
 --   allowed = the address has a register, it is writable, all strobes are set, low <= data <= high

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: plausibility checks of a raw sample, one bit each, evaluated with every sample.
 --   0  overcurrent    |i_x| >= i_trip in any phase
 --   1  current sum    |i_a + i_b + i_c| >= sum_trip

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: rejects raw samples that come too early, and reports missing ones.
 -- A strobe less than INTERVAL clocks after the last accepted one is rejected (sample_busy), reported (sample_early) and
 -- counted in early_samples, which saturates.

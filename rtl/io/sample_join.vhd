@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the sample of the core: when both the codes of the converters and the position of a trigger are there.
 --   sample_valid = the later of codes_valid and position_done since the last sample_trigger
 -- What is missing at the next trigger is forgotten: such a trigger has no sample, and the core's watchdog runs.

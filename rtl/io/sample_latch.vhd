@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: latches one raw sample, the references and the run state, so that they are constant while it is processed.
 -- Everything that may change at any clock enters the core here.
 -- Formats: unchanged.  Latency: 1.  Rounding: none.

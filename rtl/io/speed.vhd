@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: speed from two consecutive position codes, then a first-order filter.
 --   raw(k)   = k_speed * wrap(code(k) - code(k-1))
 --   omega(k) = omega(k-1) + k_filter*(raw(k) - omega_me(k-1));  omega_me = omega, rounded

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: an AXI4-Stream packet for every sample: inputs of the core, its results, and the sample number.
 -- The words of a packet (telemetry_words) are read from the core's live values, delayed by one clock: one word per
 -- clock, from TELEMETRY_WORDS_START clocks after the sample on, when the values are valid and before the next sample

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: ADC code to bus voltage and to the radius of the voltage circle.
 --   u_dc  = u_dc_gain * (code_u_dc - u_dc_offset), not below zero
 --   u_max = k_u_max * u_dc

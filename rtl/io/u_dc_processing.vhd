@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: U_dc as 2**n / m, so that the modulator multiplies instead of dividing.
 --   inverse = 1/u_dc = m * 2**n * 2**-17, see reciprocal
 --   inverse_beta = m_beta * 2**n * 2**-17,  m_beta = m * sqrt(3)/2

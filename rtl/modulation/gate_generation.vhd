@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: up-down carrier, six gate signals with dead time, enable and latched trip.
 -- The carrier counts 0 .. CARRIER_HALF-1 and back, each value once per direction.  A leg is commanded high while
 -- carrier >= CARRIER_HALF - compare.  Compare values are updated at the valley, when the carrier is 0 again, with

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: duties to compare values of the carrier, compare = duty * CARRIER_HALF, short pulses dropped.
 --   2*compare < min_pulse: 0;  CARRIER_HALF - compare < min_pulse: CARRIER_HALF
 -- Each low end of a period counts alone, because the period before or after may be high throughout.  With double_update

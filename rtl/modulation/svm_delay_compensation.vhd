@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: angle at which the voltage will act, theta_out = theta_me + k_delay*omega_me, modulo one turn.
 -- k_delay = 1.5*T_s*omega_base/(2*pi): a duty acts on average 1.5 sample times after the sampling instant.
 -- Formats: theta TURN U(0,18), omega_me PU, k_delay U(0,17).

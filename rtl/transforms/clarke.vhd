@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: three phase currents to the stator frame, amplitude-invariant; no zero-sum is assumed.
 --   i_alpha = (2*i_a - i_b - i_c) / 3
 --   i_beta  = (i_b - i_c) / sqrt(3) = (2*i_b - 2*i_c) / sqrt(12)

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the current model's flux linkage to the stator frame, the rotation by theta_me.
 --   lambda_c_alpha = lambda_c_d*cos_theta - lambda_c_q*sin_theta
 --   lambda_c_beta  = lambda_c_d*sin_theta + lambda_c_q*cos_theta

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: merged flux linkage to the rotor frame, the rotation by -theta_me.
 --   lambda_m_d =  lambda_m_alpha*cos_theta + lambda_m_beta*sin_theta
 --   lambda_m_q = -lambda_m_alpha*sin_theta + lambda_m_beta*cos_theta

@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: rotates a flux linkage by the angle whose sine and cosine are given, with two multipliers in two clocks.
 --   out_y = x*sin_theta + y*cos_theta
 --   out_x = x*cos_theta - y*sin_theta

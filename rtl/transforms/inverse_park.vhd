@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: rotor frame to stator frame, the rotation by theta.
 --   u_alpha = u_d*cos_theta - u_q*sin_theta
 --   u_beta  = u_d*sin_theta + u_q*cos_theta

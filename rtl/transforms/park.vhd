@@ -1,3 +1,4 @@
+-- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: stator frame to rotor frame, the rotation by -theta_me.
 --   i_d =  i_alpha*cos_theta + i_beta*sin_theta
 --   i_q = -i_alpha*sin_theta + i_beta*cos_theta

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`make fuzz`: hostile and damaged inputs for everything that reads a file or writes text of another language.
 
     make fuzz ARGS='--minutes 10 --seed 3 --only readers,drives'

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One input of a target, and what became of it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The process in which cases run: a crash, a hang or a limit of memory ends it and not the fuzzing."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Small valid files of every format, which are then damaged."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Writes a find as a file that shows the fault and a text that says what it is and how to see it again."""
 
 from __future__ import annotations

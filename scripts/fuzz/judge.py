@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Runs one case in the child and says what is wrong with its end: the oracle of the fuzzing.
 
 Right are a result, and RecordingError or DriveError with one printable line that names the file.  Wrong are any other

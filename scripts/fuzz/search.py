@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Draws cases of a target in turns; what fails is made smaller by Hypothesis and kept once for each kind of fault."""
 
 from __future__ import annotations

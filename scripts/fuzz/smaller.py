@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Makes the content of a find smaller: leaves out lines or blocks as long as the same fault stays (delta debugging)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Notices what an input may never cause: a command, a connection, an unpickled object, evaluated text, a foreign file.
 
 An audit hook of Python sees each of these before it happens, records it and refuses it.  The hook stays for the life of

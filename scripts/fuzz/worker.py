@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The parent's side of the child: a case goes there as a file, and a child that ends or hangs is a verdict too."""
 
 from __future__ import annotations

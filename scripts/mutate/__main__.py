@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`make mutate`: draws mutants of every block and of the core's wiring; their benches must notice them.
 
 Writes build/mutate/result.json.  Exit status 1 if less than 99.5 % of the mutants that are not proved equivalent are

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The contract of a block as a circuit: every input sequence that it allows, and a flag for what its bench notices.
 
 The module `miter` holds the block twice, as it is (`gold`) and mutated (`gate`): graph.py gives their inputs `mutant`

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The wiring of the whole core: mutants of the top's own cells and connections, judged by the golden core.
 
 Three runs, each clock of them compared: every operating condition in 50 ms in closed loop (`compressed` in

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Defects planted by hand in copies of the VHDL, for what no netlist of one configuration shows, or no block's bench.
 
 They are in generics and functions that run at elaboration, in the register bus, in the asynchronous path of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Mutations of a netlist, drawn at random by Yosys' `mutate`, and the netlist that contains all of them.
 
 The netlist is coarse: adders, multiplexers and registers of whole words, as they stand after `proc`, cut to the bits

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Proves for mutants that the bench does not notice that no bench could: equal wherever one compares.
 
 Yosys makes one and-inverter graph of the miter (scripts/mutate/contract.py) for all of them; what a mutant does not

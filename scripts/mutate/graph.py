@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """An and-inverter graph that holds a block twice, and what of it can matter for one mutant.
 
 Both halves have their registers in pairs.  As long as all pairs are equal, the mutant behaves like the block: it is
@@ -130,7 +131,7 @@ class Graph:
             a, b = b, a
         if b == 0 or a == b ^ 1:
             return 0
-        if b == 1 or a == b:
+        if b in (1, a):
             return a
         found = self.made.get((a, b))
         if found is None:
@@ -180,9 +181,9 @@ class Graph:
         """Pairs whose next values differ in structure; those that are one."""
         found = []
         for k, (gold, gate) in enumerate(self.pairs):
-            if value[self.first + gate] == 2 * (self.first + gold):
-                if self._of(self.next[gold], value) != self._of(self.next[gate], value):
-                    found.append(k)
+            merged = value[self.first + gate] == 2 * (self.first + gold)
+            if merged and self._of(self.next[gold], value) != self._of(self.next[gate], value):
+                found.append(k)
         return found
 
     def step(self, value: list[int], free: bool) -> Cut:

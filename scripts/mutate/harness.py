@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Runs mutants in Verilator against the schedule of a bench: one library for all mutations of a netlist."""
 
 from __future__ import annotations

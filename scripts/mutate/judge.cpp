@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // Drives one mutated block with the schedule of its bench and looks for the first difference.
 //
 // scripts/mutate/harness.py writes ports.inc with a line PORT(name, width, is_signed) for each port but the control

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One subject from the VHDL to the verdicts: converted, mutated, run, and what nobody noticed proved or reported."""
 
 from __future__ import annotations

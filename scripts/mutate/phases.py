@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Proves a mutant equivalent by what may differ in which clock of a sample, for blocks with strobes.
 
 A phase is the state of the contract's own counters (scripts/mutate/contract.py): the clocks since the last sample, and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A multiplier taken out of a netlist: any number of the right sign that is no larger than its operands allow."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What is mutated: each block of the registry with each of its configurations, and the wiring of the core."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Mutants that no bench notices, that are not proved equivalent, and why they cannot matter.
 
 A key is the block and a pattern of the mutation as Yosys writes it, without numbers of lines: it stays valid where the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """``make package``: the core as one zip file for Vivado's IP repository, checked before it is written.
 
     python -m scripts.package        build/package/fluxproof_axi_VERSION.zip

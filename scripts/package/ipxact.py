@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Writes component.xml, the IP-XACT description (IEEE 1685-2009) of fluxproof_axi for Vivado.
 
 Ports and generics come from the VHDL entity, the memory map from the registers' SystemRDL, the files from

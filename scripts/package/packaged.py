@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Every committed packaging file as text; see scripts/generate.py."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A generator for FuseSoC: converts the top of fluxproof.core to Verilog with GHDL 5 (fluxproof/cosim/verilog.py).
 
 FuseSoC starts it in an empty folder with the name of a YAML file; it writes NAME.v and a core file for it.

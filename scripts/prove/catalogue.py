@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Every property that `make prove` proves."""
 
 from __future__ import annotations

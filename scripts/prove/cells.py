@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The cells of the arithmetic compute their equation three clocks later: every operand of small width."""
 
 from __future__ import annotations

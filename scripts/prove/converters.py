@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Properties of the front ends: pins, answers to triggers, codes that change together."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Properties of the gates at the pins of the whole core, including its wiring.
 
 Every other block is cut off and its outputs may have any value at any clock, which makes the proof stronger.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Properties of the current references: the circle of current_limit, and the regulator within its limit."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The table of docs/proofs.md, from the last complete run: ``python -m scripts.prove --document``."""
 
 from __future__ import annotations

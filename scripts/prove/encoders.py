@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Properties of the encoder inputs: filter, decoder, counter within a turn."""
 
 from __future__ import annotations

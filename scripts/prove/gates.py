@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Properties of the gates, for any inputs at any clock."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The verdict on one property: is it proved, are its covers reachable, are its planted faults detected?"""
 
 from __future__ import annotations

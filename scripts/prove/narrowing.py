@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """fixed_pkg: no function wraps, for every input, in every combination of widths that the core uses.
 
 The widths are found automatically: a copy of the package in which each function reports its widths is elaborated with

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Every block's out_valid: exactly LATENCY clocks after in_valid, never without a sample, none after a reset.
 
 The harness is generated from the block's declaration, so a new block of the registry needs no code here.

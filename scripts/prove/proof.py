@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A proof: an entity, a harness around it, a method, and the planted faults that it must detect."""
 
 from __future__ import annotations

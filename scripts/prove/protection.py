@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Properties of the fault latch and the sample guard: stop of the gates, its duration, distance of samples."""
 
 from __future__ import annotations

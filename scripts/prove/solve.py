@@ -1,7 +1,9 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One run of the solver: converts the VHDL, writes the job of sby, runs it within a time limit, reads the result."""
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import shutil
@@ -171,8 +173,6 @@ def run_sby(folder: Path, limit: int) -> str:
         except subprocess.TimeoutExpired:
             said = f"DONE (TIMEOUT, rc=8): stopped after {limit + 15} s\n"
         finally:
-            try:
+            with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)  # its own session: only its children
-            except ProcessLookupError:
-                pass
     return said

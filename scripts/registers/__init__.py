@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The register map as SystemRDL, and everything generated from it: VHDL, C header, names, HTML, IP-XACT."""

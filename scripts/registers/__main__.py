@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`make registers`: HTML pages and the IP-XACT memory map from rtl/generated/fluxproof.rdl, into build/registers."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The contents of the SystemRDL file, read by systemrdl-compiler, as plain tuples for the templates."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Every committed file generated from the register map, as text: the SystemRDL, and the files generated from it."""
 
 from __future__ import annotations

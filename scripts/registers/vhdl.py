@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The VHDL of the register map, from the compiled SystemRDL alone: register_map_pkg.vhd and both register files."""
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
 # Provide GHDL 5 as .cache/ghdl5/bin/ghdl, for the VHDL -> Verilog conversion.
 #
 # GHDL 2 miscompiles in silence when it writes Verilog (a signed shift_right

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`make lock`: writes requirements.lock and requirements/*.txt from the lists in pyproject.toml.
 
 One resolution for every group, Python version and system goes to requirements.lock, with hashes.

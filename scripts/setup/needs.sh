@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # Sourced by scripts/setup.sh: what each target of the Makefile uses, in words (bash).
 #
 #   a group of Python packages   each has its list in requirements/ (pyproject.toml says what it is for)
@@ -23,7 +24,7 @@ needs_of() {
         prove) echo core prove ghdl5 yosys ;;
         synth) echo core run report sim synth test ghdl c++ ghdl5 yosys ;;
         ecp5) echo core report synth ghdl5 yosys nextpnr ;;
-        lint) echo lint ;;
+        lint) echo core run fleet sim lint ;;
         mutate) echo core run report sim package prove test ghdl c++ ghdl5 yosys ;;
         test | slow) echo "$(needs_of mutate)" blind fleet compare lint tcl browser ;;
         setup) echo "$(needs_of test)" synth nextpnr ;;

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # Sourced by scripts/setup.sh: system packages, with apt-get (bash).
 # Each is looked for by what it provides, so one that came another way (say, a GHDL built from source) is not installed
 # again.

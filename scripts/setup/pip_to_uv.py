@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Prints pip's settings as uv's environment, in `export` lines for a shell: uv does not read pip.conf.
 
 What is set for uv already is left alone.  Exit status 1 where a setting has no counterpart: then pip must install.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # Sourced by scripts/setup.sh: GHDL 5, Yosys and nextpnr (bash).
 
 # ---------------------------------------------------------------- GHDL 5

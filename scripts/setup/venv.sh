@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # Sourced by scripts/setup.sh: find an interpreter, build .venv (bash).
 
 # An interpreter is usable when its version fits, it can make a virtual

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`make synth`: cells of three Xilinx families by group, longest paths, ECP5 by stock tools; see docs/synth.md.
 
     make synth                                            counts, structure and netlist, into build/synth

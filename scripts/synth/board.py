@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`python -m scripts.synth --board`: cells of every choice of fluxproof_board's front ends, and of whole boards.
 
 A front end is counted alone, with its generic; a board in one piece, with the core and all registers.

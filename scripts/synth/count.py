@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Counting cells: what yosys prints, as LUT, FF, DSP and block RAM; unknown cells are an error."""
 
 from __future__ import annotations

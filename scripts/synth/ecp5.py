@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Routed timing on an ECP5 by stock tools: `synth_ecp5`, then nextpnr-ecp5 without a constraint.
 
 Xilinx parts have no open place and route with timing in the registries that this project installs from; ECP5 has.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Which instance of rtl/fluxproof.vhd belongs to which row of the report; every one to exactly one.
 
 The rows are those of paper 001, Table 1, and three of our own.  What a block is there for decides, not the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Kept counts: docs/synth/counts.json, and what differs from it by more than 3 %.
 
 The file changes only by ``--update "reason"``; its log says when, why and which figures moved.  Smaller changes

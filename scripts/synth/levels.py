@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The longest path from register to register of each block of a netlist, in LUT levels and carry cells.
 
 There is no delay of a wire in a netlist, so this is no timing.  WEIGHT decides which of a block's paths is the longest:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The mapped netlist as something that runs: what yosys made of the core or a block for 7 series, cell by cell.
 
 A count is worth nothing where the mapping is wrong, and yosys has packed adders into a DSP48 wrongly before (a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Which DSP48E1 of a netlist has registers at its operands and at its product or sum."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A netlist that yosys mapped for 7 series (its JSON), as multipliers.py and levels.py read it."""
 
 from __future__ import annotations

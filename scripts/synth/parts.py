@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The parts of `make synth`, as many side by side as there are cores: counts, structure, ECP5, netlist against core."""
 
 from __future__ import annotations

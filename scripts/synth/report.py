@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What is printed and drawn: tables as text, the stacked bars of build/synth/resources.svg."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Running yosys on the converted core: a block, the groups, the whole."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # The clock of a project whose top is the core itself, by its generic CLOCK_HZ: FuseSoC sources this when it makes the
 # project.  In a block design the clock comes from outside, and Vivado makes the constraint.
 #

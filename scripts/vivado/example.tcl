@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # A small Zynq-7000 project with the core in a block design, synthesised, placed and routed, with reports:
 #
 #   vivado -mode batch -source scripts/vivado/example.tcl [-tclargs OUT_DIR PART]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # Constraints of the example design.  Pin numbers are your board's: add them here before you write a bitstream.
 # Until the FPGA is configured its pins are not driven: pull the gates down on the board.
 

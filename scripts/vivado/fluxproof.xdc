@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # Constraints of the core itself, scoped to fluxproof_axi (IP-XACT does that; by hand: read_xdc -ref fluxproof_axi).
 
 # The trip pin sets this register without a clock, so there is no edge to be in time for.  From its output on, every

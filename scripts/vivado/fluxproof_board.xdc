@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # Constraints of a board, scoped to fluxproof_board: read_xdc -ref fluxproof_board scripts/vivado/fluxproof_board.xdc
 
 # The trip pin sets this register without a clock; see fluxproof.xdc.

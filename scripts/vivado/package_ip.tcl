@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # Packages the core as Vivado would by hand, into OUT_DIR/ip (default build/vivado/ip):
 #
 #   vivado -mode batch -source scripts/vivado/package_ip.tcl [-tclargs OUT_DIR]

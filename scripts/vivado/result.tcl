@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # What a routed run gave, for the table of docs/vivado.md: OUT_DIR/result.md holds its row, OUT_DIR/result.json the same.
 
 # The commit of the sources: "+" behind it where files have been changed since, "unknown" without git.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`make bench`: time and memory of ``fluxproof diagnose`` against the rows of a recording.
 
 The recorded drive has 20 % more resistance than its drive file: the core in closed loop with the averaged plant, with

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`make bench`: control periods per second of the compiled golden model.  Writes build/bench/golden.json."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`python -m studies.blind --seed 1`: generate, diagnose, score, for each generator by itself.
 
 build/blind/GENERATOR/ holds a generator's cases, result.json and report.html; build/blind/result.json the figures of

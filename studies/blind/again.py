@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The recording that a diagnosis requests, simulated with the same hidden drive, and whether it resolves the tie."""
 
 from __future__ import annotations

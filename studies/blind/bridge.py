@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Three inverter legs between switching instants: commands, dead time, commutation by current direction, drops.
 
 Centre-aligned PWM: the upper switch is commanded on from t1 = T(1 - d)/2 to t2 = T(1 + d)/2.  Each turn-on is delayed

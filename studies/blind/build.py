@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Builder of one drive: forms.py adds effects one by one, ``record`` simulates it."""
 
 from __future__ import annotations

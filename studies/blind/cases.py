@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Random cases of the benchmark: stratum, effects, forms and sizes, determined by (seed, index, stratum)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Faults of a recording: effects of a logger, a cable or a wrong unit on healthy columns.
 
 Each function changes the columns {name: (n,)} and returns the accepted problem codes.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """First-order signature of each effect in a recording of a given plan: rows of a linear design matrix.
 
 Used only to decide which effects a recording can separate, independent of the estimator (identifiable.py).  At each

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The figures of the benchmark from pairs of truth and answer; pure functions without files.
 
 A truth is an entry of the sealed file (generate.py); an answer is ``Diagnosis.to_json()`` with ``seconds``,

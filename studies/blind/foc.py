@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Float field-oriented control on measured signals: PI in dq with decoupling, voltage limit, modulation.
 
 Uses the nominal machine only.  The voltage is rotated to the middle of the period in which it takes effect,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """All effects of the benchmark, and ``apply``, which adds one to a drive."""
 
 from __future__ import annotations

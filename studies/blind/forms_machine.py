@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Effects of machine, inverter and shaft, in the catalogue's form and in others (registry.py)."""
 
 from __future__ import annotations
@@ -221,7 +222,7 @@ def phase_resistance_asymmetry(b, rng, size, form):
     x = 0.1 * size * three(rng, form != CATALOGUE)
     fade = 0.25 * (form != CATALOGUE)  # a bad contact improves as it warms
     b.on_course.append(lambda c, s: c.r_scale.__imul__(1.0 + x[:, None] * (1.0 - fade * s)))
-    return {} if fade else dict(zip(("asymmetry_a", "asymmetry_b", "asymmetry_c"), x))
+    return {} if fade else dict(zip(("asymmetry_a", "asymmetry_b", "asymmetry_c"), x, strict=True))
 
 
 @effect("two_harmonics")

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Effects of sensors and sampling, in the catalogue's form and in others (registry.py).
 
 Signs: measured = true (1 + gain) + offset, for angles measured = true + offset, for the bus measured =
@@ -54,7 +55,7 @@ def current_offset(b, rng, size, form):
     if creep:
         return {}
     # A common-mode part is not visible in dq.
-    return dict(zip(("offset_a_a", "offset_b_a", "offset_c_a"), offsets))
+    return dict(zip(("offset_a_a", "offset_b_a", "offset_c_a"), offsets, strict=True))
 
 
 @effect("two_sensors", "all_three")
@@ -65,7 +66,7 @@ def current_gain(b, rng, size, form):
         g = 0.02 * size * sign(rng) * np.array((1.0, -1.0, 0.0))
         b.change("sensor", two_sensors=1)
     b.change("sensor", gain_a=g[0], gain_b=g[1], gain_c=g[2])
-    return {} if form == "two_sensors" else dict(zip(("gain_a", "gain_b", "gain_c"), g))
+    return {} if form == "two_sensors" else dict(zip(("gain_a", "gain_b", "gain_c"), g, strict=True))
 
 
 @effect("drooping")

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Write a benchmark: `python -m studies.blind.generate --generator motulator --seed 1 --count 60`.
 
 OUT/case_0001/recording.csv or .parquet and drive.toml, shuffled so that a number says nothing about the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Which effects of a case are identifiable from its recording, independent of the estimator.
 
 An effect counts as identifiable unless another set of catalogue effects, no larger than the true one and without that

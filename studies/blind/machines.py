@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Random drives with realistic per-unit values, and the nominal drive.toml of each."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Flux linkage of the synthetic machines and its inverse.
 
 All of it comes from one co-energy W(i_d, i_q) = S_d(i_d) + S_q(i_q) + C(i_d, i_q), so that

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """report.html of the benchmark: figures with their targets, strata, effects, confusion table, failures."""
 
 from __future__ import annotations

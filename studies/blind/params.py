@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Parameters of a simulated drive: named tuples for compiled code, SI units, peak values.
 
 ``ideal()`` is a drive without any effect; an effect changes fields of it (forms.py).

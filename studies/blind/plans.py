@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Operating plans: the speeds and currents of a recording, and the resulting courses.
 
 A plan is a list of segments; courses are arrays with one value per row (params.Course).

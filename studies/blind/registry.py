@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Registry of the benchmark's effects: name, function and functional forms.
 
 An effect is a function (build, rng, size, form) -> {parameter: true value}; ``size`` is a factor on a typical

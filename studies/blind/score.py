@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Diagnose every case of a sealed benchmark, then open the truth and score it: `python -m studies.blind.score`.
 
 Writes result.json (every figure with its Wilson interval) and report.html into the folder above the cases.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The sealed truth: one compressed file next to the case folders, whose SHA-256 is fixed before any run."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Sensors: measured currents, angle, speed and bus voltage for controller and recording."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Switching-level simulation of a drive with field-oriented control; the benchmark's own physics.
 
 State: stator flux linkage in the stator frame, speed, angle.  d psi/dt = C(v_leg - R_x i_x), with the legs'
@@ -282,4 +283,4 @@ def simulate(drive, course, rng, theta_m=0.0, substeps=1, trace=False):
     run(drive, course, rng.standard_normal((n, 6)), start, duties, substeps, rows, held)
     columns = {"t": np.arange(n) * drive.period_s}
     columns.update((name, rows[:, j]) for j, name in enumerate(ROWS))
-    return columns, dict(zip(TRACE, held.T)) if trace else None
+    return columns, dict(zip(TRACE, held.T, strict=True)) if trace else None

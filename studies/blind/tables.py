@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The benchmark's tables: figures by functional form, strata, effects, confusion, times (see figures.py)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The same drives behind a slow logger: every N-th row of each case: `python -m studies.blind.thinned --seed 1`.
 
 Rows that do not follow each other have no voltage balance between them: what is left are operating points, which show
@@ -10,7 +11,7 @@ import argparse
 import sys
 from pathlib import Path
 
-import pyarrow.parquet as parquet
+from pyarrow import parquet
 
 from fluxproof.checkout import BUILD
 from fluxproof.diagnosis.catalogue import CATALOGUE

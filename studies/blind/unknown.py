@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Effects that no catalogue entry describes; the correct answer is "unknown"."""
 
 from __future__ import annotations

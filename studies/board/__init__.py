@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The figures of a board, from pins to a turning motor: `make board`."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Runs the tests that measure figures of a board and writes them to build/studies/board.json.
 
     make board                              all of them, some minutes

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Commissioning on random motors and on boards that are wired wrongly: what `make board` shows of it.
 
 python -m studies.board.commissioning [COUNT]        a line a motor, then the figures

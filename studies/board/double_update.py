@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Frequency response of the closed current loop at 10 kHz PWM, with one and with two updates a period.
 
 The golden core runs on the switching plant with the drive file's dead time, at a third of the rated speed and half

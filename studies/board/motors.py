@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Random drives of three voltage classes for commissioning: the true one in its plant, and a file with wrong values."""
 
 from __future__ import annotations

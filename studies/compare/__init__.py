@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Alternatives to the diagnosis, on the same sealed cases.
 
 Three established methods: sparse regression (pySINDy), NARMAX selection (SysIdentPy) and a joint least-squares fit of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Compare the diagnosis with alternative methods: `python -m studies.compare --seed 1`.
 
 Writes build/compare/result.json (every figure with its Wilson interval, every case), table.md and table.html.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The cases of a comparison: healthy drives, single effects and pairs of a sealed benchmark.
 
 If the blind benchmark of the seed exists (build/blind/own/seedN), its cases are used; otherwise the same generator

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The data of a case for every method: the nominal drive's misfit in steady blocks and the signals that may explain it.
 
     u      u_recorded - R mean(i) - [psi(i+, theta+) - psi(i, theta)] / T in dq, complex (b, m) [V]

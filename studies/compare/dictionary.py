@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The generic library from which pySINDy and SysIdentPy choose: candidate terms for each equation.
 
 In per unit: d, q the currents over the rated one, w the speed over its maximum, t the elapsed share of the recording,

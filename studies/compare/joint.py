@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Joint least squares: all parameters of the drive model at once, scipy.optimize.least_squares.
 
 An effect is named if the 95 % interval of its parameter (or region of its parameters) excludes the nominal value and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Model of the drive with all parameters that may be wrong, and its prediction of a recording.
 
     u_s = R_x i_s + d psi_s / dt + V_dead sgn(i_x),   psi = L i + psi_m + saturation + cross-saturation + harmonics

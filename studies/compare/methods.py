@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The methods side by side: how each is called, and the settings that were tuned on another seed.
 
 A method is a module with ``fit(data, **settings)``, ``names(fitted, **settings)`` and a grid for both.

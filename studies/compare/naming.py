@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Names of effects for selected terms: the interpretation of a sparse model of the misfit by an engineer.
 
     u_d: d, u_q: q                  resistance          (times T: resistance_temperature)

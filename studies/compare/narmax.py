@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """NARMAX selection: SysIdentPy's FROLS (error reduction ratio, order by BIC) on the misfit of the nominal drive.
 
 The polynomial basis is of degree one because the candidates (dictionary.py) are already products; the model is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Run every method on a case, and compute the figures of all answers.
 
 The answer of every method has the form of diagnosis.json as far as applicable, so that the figures of the blind

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Sparse regression: pySINDy's STLSQ on the misfit of the nominal drive (a discrepancy model).
 
 The left-hand side is given (the balance does not use pySINDy's derivatives); averaged rows on both sides are its weak

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The comparison as a table: Markdown for the notes, an HTML snippet for the reports."""
 
 from __future__ import annotations

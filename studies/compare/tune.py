@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Tune the methods on a separate seed: `python -m studies.compare.tune --seed 951`.
 
 Every setting of a method's grid is tested on every case; the one that names the most single effects and pairs exactly

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`make demo`: the RTL spins a motor, and says why another one differs from its drive file.
 
 In Verilator the RTL, converted to Verilog, runs Fig. 9 of paper 001 at the drive's own clock, then a real recording;

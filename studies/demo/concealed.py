@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the closed loop conceals: currents on their references, and the voltages that show the difference."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The demo's second half: the RTL drives the motor of `fluxproof diagnose --example`, and its telemetry is diagnosed.
 
 The motor differs from its drive file; the currents follow their references all the same, as the loop is closed.  What

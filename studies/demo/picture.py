@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The README's picture of a diagnosis, of the example: `python -m studies.demo.picture docs/img/diagnosis.png`."""
 
 from __future__ import annotations

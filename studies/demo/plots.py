@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The demo's figures: Fig. 9 of paper 001 from the simulation, what lies behind it, and the recording.
 
 The drawing functions take the views of studies/demo/report.py, in SI units; lines carry names at their ends.

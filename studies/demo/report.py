@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the demo measured: numbers from the simulation's integers, and one HTML page that shows them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`make faults`: response to faults of sensors, bus, strobes and software; converted RTL against golden core.
 
 Writes build/faults/result.json and the table build/faults/table.md; ``--docs`` puts the table into docs/faults.md.

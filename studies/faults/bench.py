@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Closed loop with faults: core and plant clock by clock, the golden core in parallel, every clock compared.
 
 A case changes codes, bus voltage, strobes, pins or registers of a period.  Both cores get the same inputs; the

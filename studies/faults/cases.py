@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The fault cases at 732 rpm under load: failing sensors, bus, strobes and pins, and the expected response."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Cores for studies/faults/bench.py: the converted RTL in Verilator, and the golden core itself.
 
 Both record their inputs: ``writes`` contains the inputs that change before each clock, so that the VHDL in GHDL can

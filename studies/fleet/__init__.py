@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Simulated fleets and the figures of ``fluxproof fleet`` on them (``make fleet``)."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`python -m studies.fleet`: measure the figures of `fluxproof fleet` on simulated fleets; build/studies/fleet.json.
 
 A run that was stopped goes on where it was: recordings, rows and figures that are there are not made again.

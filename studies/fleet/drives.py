@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Fleets of one design: every drive has its own resistance, inductances and magnet flux, some a hidden fault.
 
 The simulator is that of the own generator of the blind study, which is not the estimator's model.

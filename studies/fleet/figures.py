@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The figures of ``make fleet``, each measured by itself: [{"figure", "ours", "target", "pass"}]."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The README's picture of a fleet: a parameter over the drives, a drift; `python -m studies.fleet --picture FILE`."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Fleets on disk and runs over them, each resumable, with the wall time and the memory that they took."""
 
 from __future__ import annotations

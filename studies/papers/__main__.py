@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`make papers`: the experiments of the papers on the golden model with the switching plant, the key ones on the RTL.
 
 Writes build/papers/flux.json and vsi.json, a picture of every figure and report.html.  Exit status 1 where a finding is

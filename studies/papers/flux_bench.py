@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The drive of paper 001 on its bench: scenarios to traces in SI units, findings for build/papers/flux.json.
 
 The golden model drives the switching plant.  The inverter is ideal as in the paper, whose estimator assumes its

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Beyond paper 001: motors that saturate, reversal through zero, what the decoupling gains, torque."""
 
 from __future__ import annotations

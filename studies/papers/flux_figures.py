@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The figures of paper 001, one function each: runs the scenarios and returns what was found, with its traces."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Figures like those of paper 001: actual and estimated flux linkages, and what goes with them."""
 
 from __future__ import annotations

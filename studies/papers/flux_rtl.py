@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The key experiments through the core, every bit compared with the golden model beside it.
 
 In Verilator the RTL, converted to Verilog, runs all of each; the VHDL itself runs the first periods in GHDL.

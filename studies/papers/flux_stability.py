@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Stability of drive and estimator together: eigenvalues of one sample over the whole range of speed.
 
 For equal inductances every signal is a complex number in the rotor frame (d + j*q), and the drive at a constant speed

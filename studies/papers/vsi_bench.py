@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The drive of paper 000 on its bench: an inverter with dead time and drops, a motor whose flux falls under load.
 
 What the paper leaves open is chosen so that its own figures come out (docs/vsi_estimators.md): the leg voltage that

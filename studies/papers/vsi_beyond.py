@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Beyond paper 000: i_d /= 0, a salient motor, and both papers together."""
 
 from __future__ import annotations

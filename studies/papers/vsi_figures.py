@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The figures and tables of paper 000, one function each: runs the scenarios and returns what was found."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Figures like those of paper 000: direction functions, V_dead, currents, the magnets' flux."""
 
 from __future__ import annotations

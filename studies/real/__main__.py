@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """``make real``: diagnose every available real recording; writes build/real/result.json and a folder for each.
 
 The recordings are not part of the project: FLUXPROOF_RECORDINGS names their folder, ../shared/recordings without it.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Identification of the measured Brusa map from terminal quantities: closed loop with a linear nameplate.
 
 Two recordings at shuffled operating points and two speeds identify the missing effects; a third one covers the current

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The measured Brusa map in closed loop: the golden model uses a linear nameplate, the switching plant the map.
 
 The load machine imposes the speed, the core regulates dq currents over a grid; its inputs and outputs become a

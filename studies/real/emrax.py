@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The EMRAX 228 of a race motorcycle: 475 s of CAN messages, a few per second, against its data sheet.
 
 The recorded voltages are commanded ones, so that inverter loss and delay are part of the misfit; there is no angle, no

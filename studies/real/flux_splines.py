@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Tensor-product splines over the dq current plane, and the EMF of the derivatives of each of them in a block.
 
 A co-energy W = sum of w_jk B_j(i_d) B_k(i_q) has the flux dW/di_d + j dW/di_q; the splines are cubic, on equal steps.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Flux map from a recording: one free co-energy surface W(i_d, i_q) whose partial derivatives are both fluxes.
 
     psi_d = L_d i_d + psi_m + dW/di_d        psi_q = L_q i_q + dW/di_q

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The LAAS logs of an MN4004: what a q-axis log at 1 kHz reveals about a drive with 40 kHz sampling, and its limits.
 
 Three logs: held still at many angles, a torque sine of 2 Hz, speed control.  The first gives the resistance, cogging

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the LAAS logs cannot determine, as sentences, each with the bound that they give."""
 
 from __future__ import annotations

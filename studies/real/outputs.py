@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Outputs of a real recording: its folder and its entry of result.json."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Quasi-steady q-axis identification from a log without d axis: i_q, u_q and shaft speed, far slower than the control.
 
     u_q = R i_q + k_e (omega + tau_v d omega/dt) + v sgn(i_q) + L_q di_q/dt + u_0        electrical

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A set of effects fitted to one part of a log and tested on the rest; effects added to it; its flux linkage."""
 
 from __future__ import annotations

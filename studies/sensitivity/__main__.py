@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Halve and double every constant of the inference: `python -m studies.sensitivity --seed 7`.
 
 Writes build/sensitivity/result.json: {"constants", "cases", "worst", "worst_share", "each": {NAME: {...}}}.  An answer

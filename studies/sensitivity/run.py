@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One case under every variation of the constants: which verdict and which names."""
 
 from __future__ import annotations

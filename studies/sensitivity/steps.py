@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Steps of the inference whose results are kept as long as nothing that they read has changed.
 
 A kept result is used again for the same arguments if every constant that the step read, itself or in a step within it,

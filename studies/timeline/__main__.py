@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`make timeline`: our Fig. 8, measured in the simulation: first and last clock of each block's activity.
 
 Writes build/timeline.json and build/timeline.svg.

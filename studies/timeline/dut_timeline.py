@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Inside the simulator: one sample through the top; when does each block's in_valid and out_valid rise?"""
 
 from __future__ import annotations

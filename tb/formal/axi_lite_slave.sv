@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The rules of AXI4-Lite, around the converted entity axi_lite_slave and through its ports alone.
 // The master may do whatever the protocol allows; the registers behind may answer in any clock with a request.
 // One property at a time: the macro of its name is defined when this file is read.

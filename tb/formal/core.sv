@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the whole core promises of its gates; the ports and the instance are made from the converted entity.
 // What no gate depends on in these properties is cut off: any value may come from there at any clock.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the limit of the current promises, around the converted entity current_limit and through its ports alone.
 // A sample may come at any time that is at least INTERVAL clocks after the last one; its inputs stay until then.
 

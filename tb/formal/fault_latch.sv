@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the memory of faults promises, around the converted entity fault_latch and through its ports alone.
 // One property at a time: the macro of its name is defined when this file is read.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the gates promise, around the converted entity gate_generation and through its ports alone.
 // The harness keeps its own idea of the valley, of the settings in force and of what a leg was asked for.
 // `leg` is any of the three legs: the solver chooses, so a proof holds for all.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the filter of a pin promises, around the converted entity input_filter and through its ports alone.
 
 module formal_top (

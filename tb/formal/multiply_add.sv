@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // multiply_add against its equation: the operands of three clocks ago, in numbers wide enough for every sum.
 
 module formal_top (

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // The rules of AXI4-Stream and what a queue owes, around the converted entity packet_fifo and through its ports alone.
 // One property at a time: the macro of its name is defined when this file is read.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What pwm_compare promises to the gates, around the converted entity and through its ports alone.
 // One property at a time: the macro of its name is defined when this file is read.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the decoder of A, B and Z promises, around the converted entity quadrature_decoder and through its ports alone.
 // One property at a time: the macro of its name is defined when this file is read.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the guard of the samples promises, around the converted entity sample_guard and through its ports alone.
 // One property at a time: the macro of its name is defined when this file is read.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the speed regulator promises of its output, around the converted entity speed_pi and through its ports alone.
 // The products are cut off: any value may come from there at any clock.
 

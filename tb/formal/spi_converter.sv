@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the master for SPI converters promises, around the converted entity spi_converter and through its ports alone.
 // The registers are constant: any value of theirs, within the bounds of the macro's property.
 // One property at a time: the macro of its name is defined when this file is read.

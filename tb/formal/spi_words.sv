@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the receiver of SPI words promises, around the converted entity spi_words and through its ports alone.
 // The registers and the bits may change at any clock.
 

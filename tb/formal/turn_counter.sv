@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the counter within a turn promises, around the converted entity turn_counter and through its ports alone.
 // One property at a time: the macro of its name is defined when this file is read.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 // What the reader of the XADC promises, around the converted entity xadc_reader and through its ports alone.
 // One property at a time: the macro of its name is defined when this file is read.
 

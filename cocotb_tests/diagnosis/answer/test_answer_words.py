@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Headline, details, advice and doubts: no raw keys, engineering units, and something to do under every verdict."""
 
 from __future__ import annotations
@@ -255,9 +256,10 @@ def test_plausible_limits_are_of_declared_parameters():
 
 def test_requested_points_are_round_and_within_the_limits():
     rng, machine = np.random.default_rng(3), NOMINAL.machine
-    for omega, size, angle in zip(rng.uniform(-900, 900, 200), rng.uniform(0, 1, 200), rng.uniform(0, 6.3, 200)):
+    draws = [rng.uniform(*ends, 200) for ends in ((-900, 900), (0, 1), (0, 6.3))]
+    for omega, size, angle in zip(*draws, strict=True):
         i = size * machine.rated_current_a * np.exp(1j * angle)
-        within = lambda w, x: abs(w) <= abs(omega) and abs(x) <= abs(i)  # noqa: E731
+        within = lambda w, x, omega=omega, i=i: abs(w) <= abs(omega) and abs(x) <= abs(i)  # noqa: E731
         speed, current = on_the_bench(float(omega), complex(i), machine, within)
         assert within(speed, current)
         for x, exact in ((speed, omega), (current.real, i.real), (current.imag, i.imag)):

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """How credible an effect is beside what is left and beside surer effects."""
 
 from __future__ import annotations

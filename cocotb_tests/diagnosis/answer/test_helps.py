@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What an effect has to explain to be named."""
 
 from types import SimpleNamespace

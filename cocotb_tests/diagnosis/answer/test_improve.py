@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The improved drive file: values survive a round trip, the core still reads it, trims cancel the sensor errors."""
 
 from __future__ import annotations
@@ -88,7 +89,8 @@ def test_trims_cancel_the_sensor_errors(reverse, tmp_path):
             r.offset_a, r.offset_b, r.offset_c, r.gain_a, r.gain_b, r.gain_c, 0, config.adc_bits,
         )  # fmt: skip
         wanted = [
-            x * (1.0 + error * g) + error * o for x, g, o in zip(i, (0.02, 0, -0.03), (0.1, -0.05, 0.02))
+            x * (1.0 + error * g) + error * o
+            for x, g, o in zip(i, (0.02, 0, -0.03), (0.1, -0.05, 0.02), strict=True)
         ]
         np.testing.assert_allclose(np.array(seen[:3]) * amp, wanted, atol=6 * amp)
         u, _, _ = u_dc_conditioning.step(

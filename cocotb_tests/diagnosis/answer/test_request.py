@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The requested recording: points that separate a rival best after it is refitted."""
 
 from __future__ import annotations

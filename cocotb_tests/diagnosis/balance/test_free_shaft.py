@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A free shaft: its acceleration is a second difference of the angle, whose noise is small at low speed only."""
 
 from types import SimpleNamespace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Further recordings: where on the course of a drift they belong, how they are cut and what is held out."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Late pulses: the ripple that samples see, and how the delay is found when several look alike."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Operating points, the course of a drift, and the current between samples."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The beat of an encoder's codes with the sampling, predicted and simulated."""
 
 from types import SimpleNamespace

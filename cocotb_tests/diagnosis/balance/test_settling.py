@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The start of a recording: settling is excluded, drift is not."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Slow logs: selection of stretches, contents of a block, and which effects are named, excluded and ambiguous."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Rows at standstill: resistance and inverter loss, whose mean over a turn is not that at an angle."""
 
 from __future__ import annotations

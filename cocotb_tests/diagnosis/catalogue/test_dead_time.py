@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Dead time: its loss follows the current in the middle of the pulses; the residual of its curve neither causes false
 names nor hides other effects.
 

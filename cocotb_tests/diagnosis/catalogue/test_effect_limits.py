@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Limits of single effects: signs, sizes and forms that are physically possible, and what they are relative to."""
 
 from __future__ import annotations

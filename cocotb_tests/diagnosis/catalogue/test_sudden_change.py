@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Magnets that lose flux at once in the middle of a recording, and a change for which there is no effect."""
 
 import numpy as np

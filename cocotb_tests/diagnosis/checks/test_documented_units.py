@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A unit that is written down is kept, whatever the nameplate suggests."""
 
 from __future__ import annotations

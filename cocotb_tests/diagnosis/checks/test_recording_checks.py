@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Checks of a recording: each fault is found, named and corrected; physical effects cause no findings."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Loggers that hold rows, and angles that Hall sensors hold."""
 
 from __future__ import annotations

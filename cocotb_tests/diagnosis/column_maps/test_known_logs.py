@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Ready-made maps of the columns of known loggers."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What every effect of the catalogue keeps: one file, complete, with columns, parameters and keys of the plant."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`fluxproof diagnose --prior`: the population is told, and it makes no faulty drive of a healthy one."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The statistics of a fleet on made-up rows: population, rates, outliers, drift, groups, each with a known truth."""
 
 from __future__ import annotations

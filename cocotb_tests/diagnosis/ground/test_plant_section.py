@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """[plant.*] of a drive file: every key comes back as written, a wrong one gives one line."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Quantities in text: engineering units and rounding."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Uncertainty of the parameters, and the corrections on which correct intervals depend."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The marginal likelihood of a set of effects (inference/evidence.py)."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The iteration of a set of effects around its own solution."""
 
 from types import SimpleNamespace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Sizes that are impossible or implausible, and what they cost a set of effects."""
 
 from __future__ import annotations

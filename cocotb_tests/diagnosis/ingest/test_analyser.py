@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The table of a power analyser: rms values, power and current references in place of dq voltages."""
 
 from __future__ import annotations

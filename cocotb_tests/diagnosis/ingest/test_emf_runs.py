@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """EMF runs: terminal voltages of a machine that is driven without current."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Which recordings are operating points, and constants in the place of columns."""
 
 from __future__ import annotations

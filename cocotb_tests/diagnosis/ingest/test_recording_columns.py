@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Columns of a recording: [columns] of drive.toml, ready-made maps, missing and derived columns."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Mistaken conventions are told in plain words or said to be indistinguishable, never answered by a wrong cause."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Wrong pole pairs behind a table of operating points: the right number is named, or none."""
 
 from __future__ import annotations

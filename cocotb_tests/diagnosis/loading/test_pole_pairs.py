@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Wrong pole pairs: the right number is told, or none."""
 
 from __future__ import annotations

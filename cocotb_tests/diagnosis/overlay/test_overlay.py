@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The simulation laid over a recording, of the drive file and of the improved one."""
 
 from __future__ import annotations

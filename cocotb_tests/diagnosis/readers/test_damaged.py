@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Damaged and hostile files: each gives one clear error line, or loads with a finding that names the damage."""
 
 from __future__ import annotations

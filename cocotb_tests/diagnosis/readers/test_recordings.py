@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Reading recordings: every format and layout comes back as written, with units."""
 
 from __future__ import annotations

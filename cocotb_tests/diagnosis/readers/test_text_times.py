@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Text that programs for people write: dates, clock times, quotes, thousands separators, a header inside the file."""
 
 from __future__ import annotations

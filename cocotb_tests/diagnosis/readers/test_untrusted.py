@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A file from a stranger runs nothing and opens nothing else."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Telemetry dumps and their replay: equal without a fault, and the correct block and sample for one wrong bit.
 
 The expected location is computed here from full replays of both variants, without the code under test.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Outputs of `fluxproof diagnose`: diagnosis.json against its schema, and the contents of report.html."""
 
 from __future__ import annotations

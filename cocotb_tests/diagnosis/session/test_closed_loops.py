@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Logs of speed-controlled drives with a free shaft, from simulators that are not the project's: named as they are."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The diagnosis on the project's own plant: injected effects are named with their size, and nothing else is.
 
 The recordings come from the golden core in closed loop on the switching plant (recordings/from_core.py): the current

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Errors of measurement so large that no line reaches them: scales of 0.3 to 3, angles over the whole turn."""
 
 import numpy as np

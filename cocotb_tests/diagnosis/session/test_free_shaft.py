@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A free shaft behind a speed loop."""
 
 import pytest

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Every effect of the catalogue: found in a recording, written into drive_improved.toml, and gone with that drive."""
 
 from __future__ import annotations

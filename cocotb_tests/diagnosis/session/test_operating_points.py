@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Operating points as a recording: tables, constants, one axis, logs of a few hundred hertz, several files."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Machines without magnets."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Cases of the blind study that once were answered wrongly, most of a generator that does not know the catalogue."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Causes that the simulation has no parameter for: described with their size, never named, beside what is named."""
 
 from __future__ import annotations

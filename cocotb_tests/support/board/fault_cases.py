@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Runs of the golden board that end in a fault or use a forced position; as a program: the facts of one as JSON.
 
     NUMBA_DISABLE_JIT=1 python -m cocotb_tests.support.board.fault_cases index_wrong
@@ -51,7 +52,7 @@ def forced() -> dict:
         62: {"position_source": 0},
     }
     loop, codes = BoardLoop(drive, writes), []
-    for chunk in loop.run(66):
+    for chunk in loop.run(66):  # noqa: B007  # the last one counts
         codes.append(loop.golden.state.wires.position_code)
     steps = np.diff(codes[30:60]) % (1 << 16)
     latch = loop.golden.state.of_core.of_fault_latch

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """fluxproof_board in GHDL, its pins from a file and what it shows into another: every clock against the golden board.
 
     python -m cocotb_tests.support.board.ghdl_bench RUN PERIODS FOLDER

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A motor on fluxproof_board, period by period: the golden board, what is wired to its pins, the plant.
 
 What encoder and converters answer depends on the golden board's pins; a device that gets the same inputs and gives the
@@ -11,6 +12,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -142,7 +144,7 @@ class BoardLoop:
         words = seen[:, SEEN.index("gate_high")] + 8 * seen[:, SEEN.index("gate_low")]
         ends = np.linspace(0, length, pieces + 1).astype(int)
         currents = [np.array(plant.i_abc)]
-        for begin, end in zip(ends, ends[1:]):
+        for begin, end in pairwise(ends):
             part = words[begin:end]
             at = np.flatnonzero(np.diff(part, prepend=-1))
             seconds = (end - begin) / self.clock_hz

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What is wired to the pins of a board: a model of the encoder and of the converters that a drive file names.
 
 The models are those of cocotb_tests/support/peripherals, not derived from the RTL.  ``drive(...)``

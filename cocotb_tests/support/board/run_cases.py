@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The closed loop of a board as a run: a start from standstill off the index; drive files with their own pins."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The RTL in closed loop: one run, and the pulses of a leg on its gate edges."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A stimulus for the core, and what the converted Verilog and the VHDL show of it at every clock."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The golden core on the switching plant, set up wrongly or asked for too much: the bench of the limits."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Diagnoses of the recordings of bench_logs.py, and what they say."""
 
 from __future__ import annotations

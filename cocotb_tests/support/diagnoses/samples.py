@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Synthetic diagnoses, one per verdict, with the misfit of a dead time; and a function that writes their outputs."""
 
 from __future__ import annotations

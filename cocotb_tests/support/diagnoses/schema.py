@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """diagnosis.json against its schema."""
 
 from __future__ import annotations

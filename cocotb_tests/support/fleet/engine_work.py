@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Work for the processes of an engine; imports nothing, so that a new process is there at once."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Made-up rows of a fleet's table."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A small fleet on disk: eight drives with manufacturing spread, two of them faulty, and two files that are none."""
 
 from __future__ import annotations

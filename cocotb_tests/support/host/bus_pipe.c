@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
 /* The bus of docs/software/fluxproof_bus.h over two pipes, whose numbers are in FLUXPROOF_PIPES ("3,4"): the other end is
  * cocotb_tests/support/host/golden_board.py.  Requests are "w offset value", "r offset", "t microseconds", in hexadecimal;
  * answers are the word read, "ok", or "error". */

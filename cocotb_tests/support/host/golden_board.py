@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A board with the golden model on it: registers, core, gates at the clock."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A board for software to run on: a drive with its motor, reached as docs/software/fluxproof_bus.h has it, over pipes.
 
 What is on it, the golden model or the RTL, comes in the classes below; time runs only while software waits.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A board with the AXI top on it, converted to Verilog and compiled: software's accesses are AXI4-Lite transfers."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The AXI top in GHDL as a device of the closed loop (fluxproof/cosim/closed_loop.py): software actions go over AXI."""
 
 from __future__ import annotations

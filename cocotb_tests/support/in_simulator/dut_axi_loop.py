@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Inside the simulator: the AXI top spins the motor over its registers, everything compared with the golden model."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Inside the simulator: an incremental encoder's pins from its model, the outputs against the golden model's."""
 
 from __future__ import annotations

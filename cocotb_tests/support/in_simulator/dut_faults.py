@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The fault sequence inside GHDL: the VHDL gets the inputs of the golden core clock by clock; outputs are compared."""
 
 from __future__ import annotations

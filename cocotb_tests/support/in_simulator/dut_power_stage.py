@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Inside the simulator: pulses of every length on the trip pin at any time, also while the clock is stopped."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Inside the simulator: traffic on the AXI4-Lite slave of register_file against its twin, every clock watched."""
 
 from __future__ import annotations

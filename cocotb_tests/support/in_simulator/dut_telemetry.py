@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The core with its telemetry inside GHDL: every word of every packet against the golden model, whatever the sink does.
 
 Leaves the closed loop's stream in capture.bin and what the core answered in observed.npz, in the folder of the run.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Runs inside the simulator: applies a stimulus file to any clocked entity and writes what every clock shows.
 
 The file is JSON.  ``clock``: its name; ``inputs``: names, all 0 at first; ``outputs``: name -> whether it is

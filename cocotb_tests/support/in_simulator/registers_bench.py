@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Clock, reset, bus master, twin and watch of register_file, for the tests of dut_registers.py."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A top for the tests: core and telemetry, generated from the ports of the two entities."""
 
 from __future__ import annotations

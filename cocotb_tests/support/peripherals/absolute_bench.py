@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Masters in a closed loop with the models of their encoders, over cables of any length, recorded clock by clock."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Absolute encoders as their protocols describe them, one clock at a time, on the far end of a cable.
 
 Nothing here is taken from the RTL or its golden model.  Each model is a function f(memory, clock_line) -> data line;
@@ -41,7 +42,7 @@ def endat_frame(word: list[int], errors: list[int]) -> list[int]:
 
 def ssi_word(word: list[int], gray: bool, parity: bool) -> list[int]:
     """The bits an SSI encoder sends."""
-    sent = [b ^ a for a, b in zip([0, *word], word)] if gray else list(word)
+    sent = [b ^ a for a, b in zip([0, *word], word, strict=False)] if gray else list(word)
     return [*sent, sum(sent) % 2] if parity else sent
 
 

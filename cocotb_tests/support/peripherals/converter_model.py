@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Converters as their data sheets describe them, not derived from the RTL: SPI converters, the XADC, a modulator.
 
 Time counts clocks of the core.  ``clock(...)`` takes the pins as the FPGA's registers left them after clock t and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The golden models of the front ends over many clocks, compiled: arrays in, arrays out."""
 
 from __future__ import annotations

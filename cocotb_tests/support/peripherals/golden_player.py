@@ -1,9 +1,10 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The golden model of a clocked block over arrays, row by row; compiled, so that millions of clocks take seconds."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from functools import lru_cache
+from functools import cache
 
 import numba
 import numpy as np
@@ -14,7 +15,7 @@ from golden_model.registry import BLOCKS
 PIECE = 1 << 18  # clocks at a time, for the memory
 
 
-@lru_cache(maxsize=None)
+@cache
 def _loop(name: str):
     """loop(state, rows, seen, config values): the block's step with the columns of a row as its arguments."""
     block = BLOCKS[name]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Encoders as their data sheets describe them: the shaft's place to the levels on the pins, clock by clock.
 
 Nothing here is taken from the RTL or its golden model.  ``place``: the shaft in counts (quarters of a line) as real

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Rough rides for encoder front ends: inputs clock by clock for RTL and golden model alike, seeded."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What commands are given and what they say when they are stopped."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A command started as a user starts it, which gets a signal at a chosen moment of its run.
 
 The moment is an event of Python's audit hooks: ``import`` of a module, ``open`` or ``os.rename`` (os.replace too) of a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Recordings that are no log of a running control: tables of operating points, EMF runs, one point that warms up.
 
 The machine is that of drives.py; its equations are written down here once more.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Cases of the blind study as files."""
 
 from studies.blind.generate import generate_case, listing

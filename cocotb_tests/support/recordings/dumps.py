@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Telemetry dumps of the paper's drive as recordings, and where two replays of one differ."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Recordings of the project's own drive for the tests of the diagnosis: the golden core on the switching plant.
 
 The core runs in torque mode through a plan of operating points while a test bench imposes the speed.  Machine,

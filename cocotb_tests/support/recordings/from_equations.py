@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Recordings for the tests, computed, and written in every format.
 
 ``made`` takes the duties from the discrete flux balance of the nominal machine, so that angle, currents and duties

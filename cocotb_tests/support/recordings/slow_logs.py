@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Made-up slow logs: a drive known to the last digit behind a CAN bus that holds every value until its next message.
 
 The machine is written down here once more, from its equations, so that nothing rests on how the diagnosis makes them.

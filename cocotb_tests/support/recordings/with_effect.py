@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A recording with any effect of the catalogue, made from a healthy one and the effect's own column.
 
 The column of every row is added to the duties and to the torque: the drive that needs this voltage has the effect.  So

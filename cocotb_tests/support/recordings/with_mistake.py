@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Recordings of a healthy drive with one mistake of convention each, in the recording or in the drive file.
 
 MISTAKES: {name: Mistake}.  A log has phase currents and duties, or, for mistakes of dq quantities, the currents and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Makes several hundred damaged and hostile recordings of every format, with the allowed outcomes of each."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Text that another language could take for its own: strings for property tests, names of files, parsers."""
 
 from __future__ import annotations

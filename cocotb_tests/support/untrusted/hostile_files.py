@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Recordings from a stranger: formulas that run, links, plugins, and much from few bytes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Watches what Python does while a file is read: no code, no import, no process, no network, no file but that one.
 
 Python's audit events report it, also of what a C extension does through Python; not the files that a C library opens by
@@ -32,7 +33,7 @@ def watched(path) -> Iterator[list[tuple[str, str]]]:
     Files of the installed packages and of this project, /proc and the temporary folder's own are no recordings of
     somebody else; what is opened beside ``path`` in its folder is reported.
     """
-    global _events
+    global _events  # noqa: PLW0603 a hook cannot be removed
     _hook()
     _events = seen = []
     try:
@@ -46,7 +47,7 @@ _hooked = False
 
 
 def _hook() -> None:
-    global _hooked
+    global _hooked  # noqa: PLW0603
     if not _hooked:
         sys.addaudithook(_record)
         _hooked = True

@@ -1,7 +1,9 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A target of the fuzzing that does with one byte each what no input may cause, to show that each is noticed."""
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pickle
 import signal
@@ -38,10 +40,8 @@ def warm(folder) -> None:
 
 def _hidden(function):
     """An error that the code takes for that of a damaged file, as readers do with every exception."""
-    try:
+    with contextlib.suppress(Exception):
         function()
-    except Exception:
-        pass
 
 
 def _raise(error):
@@ -63,8 +63,8 @@ FAULTS = {
     "p": lambda path: _hidden(lambda: subprocess.run(["true"])),
     "u": lambda path: _hidden(lambda: pickle.loads(b"cposix\ngetpid\n.")),
     "n": lambda path: _hidden(lambda: socket.create_connection(("127.0.0.1", 9), 0.1)),
-    "w": lambda path: _hidden(lambda: open(ELSEWHERE, "w")),
-    "r": lambda path: _hidden(lambda: open("/etc/passwd")),
+    "w": lambda path: _hidden(lambda: open(ELSEWHERE, "w")),  # noqa: SIM115
+    "r": lambda path: _hidden(lambda: open("/etc/passwd")),  # noqa: SIM115
     "m": lambda path: kept.append(np.ones(60_000_000)),
     "c": lambda path: os.kill(os.getpid(), signal.SIGSEGV),
     "q": lambda path: os._exit(0),

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 # Runs a script for Vivado without Vivado: every command that it may use is known here with its options; anything
 # else, a file that is not there, or a pin that the block design does not have, is an error.
 #

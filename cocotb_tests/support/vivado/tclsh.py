@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Tcl for Vivado run by tclsh against a stub."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What to do next, in one or two sentences for each verdict.
 
 complete(answer, nominal, effects)  # sets details, advice, and adds notes
@@ -98,7 +99,9 @@ def _periods(answer, nominal, effects) -> list[str]:
     for effect in answer.effects:
         for p in effects[effect.name].parameters if effect.name in effects else ():
             e = effect.parameters.get(p.name)
-            n = round(e.value / period) if p.periods and e is not None else 0
+            if e is None or not p.periods:
+                continue
+            n = round(e.value / period)
             if n and abs(e.value - n * period) <= max(SIGMAS * e.sigma, WHOLE * period):
                 many = "one sample" if abs(n) == 1 else f"{abs(n)} samples"
                 now = getattr(nominal.control, p.periods)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Which rows the balance of a recording uses, and what it cannot show: notes of an answer."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Requested operating points as numbers that are set on a test bench, within the limits of the drive.
 
     omega, i = on_the_bench(304.7, -1.3075 + 2.2647j, machine, within)      # 300.0, -1.3 + 2.3j

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """From a posterior to the answer: names, sizes on held-out points, verdict, next recording, evidence."""
 
 from __future__ import annotations

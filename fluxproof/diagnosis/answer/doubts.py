@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Parameters of an answer outside the range that their effects declare as plausible."""
 
 from __future__ import annotations

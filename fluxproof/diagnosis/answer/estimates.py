@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Parameters of the named effects with standard deviations.
 
 The posterior covariance of a set holds noise, discrepancy and the balance's common error.  The differences between the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Choice of a few operating points that together separate tied explanations best (optimal experiment design).
 
 The distance of two fixed predictions overestimates the separation, since a rival is refitted to the new points.  The
@@ -91,7 +92,7 @@ def spare_values(rivalries, rest, cost) -> np.ndarray:
     return worth
 
 
-def best_points(rivalries, most, doubt=0.0, strain=0.0) -> list[int]:
+def best_points(rivalries, most, doubt: float | np.ndarray = 0.0, strain: float | np.ndarray = 0.0) -> list[int]:
     """`most` different candidates that maximise the closest pair's D^2, the least dispensable first.
 
     doubt, strain: (n,) penalties of a candidate, as a share of D^2.  ``strain`` counts only if ENOUGH is reached.

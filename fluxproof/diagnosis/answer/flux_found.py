@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The flux map that a diagnosis found: the nominal flux linkage and that of the named magnetic effects, as a table.
 
     write_flux_map(answer, out)     # OUT/flux_map.csv, if a named effect bends the flux; returns its path or None
@@ -30,7 +31,7 @@ WIDTH = 0.05  # rms distance of the currents from a line, in units of their rang
 def flux_map_of(answer) -> FluxMap | None:
     """The map of an answer; None if nothing that it tells bends the flux or the recorded currents cover no area."""
     effects, c, view, mine = _model(answer)
-    if not mine:
+    if view is None or not mine:
         return None
     seen = view.i.mean(axis=1)
     axes = [np.linspace(x.min(), x.max(), POINTS) for x in (seen.real, seen.imag)]
@@ -40,7 +41,7 @@ def flux_map_of(answer) -> FluxMap | None:
     at = steady_view(view, np.zeros(i_d.size), i_d + 1j * i_q, rows=1)
     psi = at.nominal_psi + sum(effects[n].psi(at, c[n]) for n in mine)
     psi = psi[:, 0].reshape(POINTS, POINTS)
-    return FluxMap(*axes, psi.real, psi.imag)
+    return FluxMap(axes[0], axes[1], psi.real, psi.imag)
 
 
 def _model(answer):

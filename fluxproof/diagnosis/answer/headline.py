@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The answer in words: a headline of at most two lines, and the figures below it.
 
 Titles of effects and parameters are those that the effects declare.  Where a headline would be longer than

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """drive_improved.toml: the nominal drive file with the identified effects.
 
 The file keeps the text of the original; a changed line states the old value and the effect.  Values for which the
@@ -13,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import tomlkit
+from tomlkit.items import AbstractTable, Array
 
 from fluxproof.diagnosis.answer.improved_core import CoreValue, core_changes, core_values
 from fluxproof.diagnosis.conventions.apply import edit, read_drive
@@ -84,10 +86,10 @@ def _set(table, key, value, why):
         note = old.trivia.comment.lstrip("# ")
     words = [why] if old is None else [f"was {_shown(old)}", why]
     item = tomlkit.item(_toml(value))
-    for part in item.values() if isinstance(item, tomlkit.items.AbstractTable) else [item]:
-        if isinstance(part, tomlkit.items.Array) and any(isinstance(row, list) for row in part.unwrap()):
+    for part in item.values() if isinstance(item, AbstractTable) else [item]:
+        if isinstance(part, Array) and any(isinstance(row, list) for row in part.unwrap()):
             part.multiline(True)  # one line per row of the matrix
-    if not isinstance(item, tomlkit.items.AbstractTable):
+    if not isinstance(item, AbstractTable):
         item.comment(toml_comment("; ".join([*words, *([note] if note else [])])))
     else:
         item.comment(toml_comment(why))

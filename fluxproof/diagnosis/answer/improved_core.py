@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Changes in the core that follow from named effects: keys of drive.toml and the resulting registers.
 
 A sensor error becomes the trim that cancels it.  With a reading  i' = (1 + e) i + o  that includes the trims in force,
@@ -42,7 +43,7 @@ class Change(NamedTuple):
 
     section: str
     key: str
-    value: object
+    value: float | tuple[float, ...]
     why: str
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Location of the misfit: signal, harmonic orders, and regions of speed, current, temperature, bus and time."""
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ def locate(view, cells, pure) -> Location:
     for order in np.unique(np.abs(cells.order[cells.channel == "u"])):
         both = [harmonic(view, cells, cells.y, s * order) for s in ((1,) if order == 0 else (1, -1))]
         quiet = [at_order(cells, pure, s * order) for s in ((1,) if order == 0 else (1, -1))]
-        amplitude, floor = np.hypot(*map(rms, both)) if order else rms(both[0]), max(map(rms, quiet))
+        amplitude, floor = np.hypot(rms(both[0]), rms(both[1])) if order else rms(both[0]), max(map(rms, quiet))
         if amplitude > 3.0 * floor:
             orders.append(OrderLine(round(float(order), 4), float(amplitude), "V"))
     orders.sort(key=lambda line: -line.amplitude)

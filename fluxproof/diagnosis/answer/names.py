@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Which effects are named, which stay open, and with what confidence.
 
 The posterior compares sets of effects.  Where much of the misfit is left, something unknown is at work, and a part of
@@ -11,6 +12,7 @@ share r + (1 - r) D^2 / (D^2 + E^2) of the leftover's power counts.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -149,7 +151,7 @@ def _along(fit, name, others) -> float:
     return 1.0 - float(left @ left) / max(float(mine @ mine), 1e-300)
 
 
-def _credibility(fit, name, powers, sure=frozenset()) -> float:
+def _credibility(fit, name, powers, sure: Collection[str] = frozenset()) -> float:
     """Probability that an effect is no imitation; sure: effects that are none, and may leave an error of their own."""
     p, power = fit.problem.p, powers[name]
     level2 = np.bincount(p.group, p.level**2, minlength=len(p.groups))

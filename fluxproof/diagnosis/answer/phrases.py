@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Phrases of which headline, details and advice are made; titles are those that the effects declare."""
 
 from __future__ import annotations

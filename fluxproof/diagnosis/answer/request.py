@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The next recording: operating points that separate tied explanations best, also after a rival is refitted."""
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ MOST_REQUESTS = 3
 NEW_AXIS, STRAIN = 0.2, 0.2
 
 
-def steady_view(view, omega, i_dq, cold=False, rows=ROWS):
+def steady_view(view: View, omega, i_dq, cold: bool | np.ndarray = False, rows=ROWS) -> View:
     """A simulated view of steady operating points of the nominal drive: omega (b,) [rad/s], i_dq (b,) complex [A].
 
     cold: (b,) bool, points of a machine that has cooled down; at the others drifts keep their final values.
@@ -190,7 +191,8 @@ def requests(setup, fits, noise_v, cold=False) -> list[Request]:
     own = np.hypot(noise_v, balance)[p.block] / np.sqrt(BLOCKS)
     sigma = np.where(p.ok & (p.channel == "u"), own, np.inf)
     of = {n: columns_at(p, made, effects[n]) for s in solutions for n in s.names}
-    predictions, knows = [], []
+    predictions: list[np.ndarray] = []
+    knows: list[tuple[np.ndarray, np.ndarray]] = []
     for s in solutions:
         parts = (v * of[n][k] for n, c in determined(s).items() for k, v in c.items() if k in of[n])
         predictions.append(sum(parts, np.zeros(len(p.ok))))

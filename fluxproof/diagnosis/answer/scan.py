@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Two searches for misfits outside the cells' orders: other orders of the mechanical turn, and other frequencies.
 
 A misfit locked to the rotor adds up over blocks with the same phase; noise does not.  The power of the sum over the sum

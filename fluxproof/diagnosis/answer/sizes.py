@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Sizes of the misfit before and after an explanation, per channel and order, on fitted and on held-out blocks."""
 
 from __future__ import annotations

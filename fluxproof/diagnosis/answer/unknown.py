@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The single term that describes best what no effect of the catalogue explains.
 
 Each term of a generic dictionary (harmonic order times a function of the operating point) is regressed on the residual
@@ -78,10 +79,12 @@ def _best_part(cells, residual, sigma, use, order, factor):
             x = factor[cells.block[rows]] / sigma[rows]
             power = float(x @ x)
             if power < 1e-20:
-                gains.append(0.0), values.append(0.0), spreads.append(0.0)
-                continue
-            value = float(x @ (residual[rows] / sigma[rows])) / power
-            gains.append(value**2 * power), values.append(value), spreads.append(power**-0.5)
+                found = (0.0, 0.0, 0.0)
+            else:
+                value = float(x @ (residual[rows] / sigma[rows])) / power
+                found = (value**2 * power, value, power**-0.5)
+            for column, number in zip((gains, values, spreads), found, strict=True):
+                column.append(number)
         if order == 0:
             part = int(gains[1] > gains[0])
             candidate = (gains[part], values[part], spreads[part], part, 1)

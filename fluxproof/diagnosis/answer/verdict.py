@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The verdict, from names and sizes; headline.py puts it into words."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """From recordings to rows of a regression: blocks, the misfit of the nominal drive, harmonics.
 
 blocks.py, slow_view.py  steady blocks of fast and of slow recordings, as a view (view.py)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Cuts a recording into blocks of equal length in which current and speed are steady.
 
 Angles are moving averages over 2 HALF_WIDTH + 1 samples, in the misfit too: the rotor moves smoothly, unlike the codes
@@ -14,6 +15,7 @@ from fluxproof.diagnosis.balance.quantised_angle import angle_step
 from fluxproof.diagnosis.balance.settling import settled
 from fluxproof.diagnosis.balance.shaft import airgap, is_airgap, shaft_kind
 from fluxproof.diagnosis.balance.view import HALF_WIDTH, SLOPE_REACH, View, lacking
+from fluxproof.diagnosis.ground.arrays import Complex
 from fluxproof.diagnosis.ground.nominal import flux_level
 from fluxproof.diagnosis.ground.recording import Recording, RecordingError
 
@@ -45,13 +47,14 @@ def smooth(values, joined_run, half=HALF_WIDTH):
     return out
 
 
-def stator_current(recording: Recording, theta):
+def stator_current(recording: Recording, theta) -> tuple[Complex, np.ndarray | None]:
     """Complex stator-frame current (n,) and phase currents (n, 3) or None."""
     r = recording
     if r.has("i_a", "i_b"):
         third = r["i_c"] if r.has("i_c") else -r["i_a"] - r["i_b"]
         abc = np.stack([r["i_a"], r["i_b"], third], axis=1)
-        return (2 / 3) * (abc @ np.exp(2j * np.pi / 3 * np.arange(3))), abc if r.has("i_c") else None
+        turned: Complex = abc @ np.exp(2j * np.pi / 3 * np.arange(3))
+        return (2 / 3) * turned, abc if r.has("i_c") else None
     return (r["i_d"] + 1j * r["i_q"]) * np.exp(1j * theta), None  # a dq log was already rotated by the drive
 
 
@@ -151,15 +154,16 @@ def views_of(recordings, nominal, catalogue: dict | None = None) -> list[View]:
     ]
 
 
-def _voltage(recording, nominal, theta_s):
+def _voltage(recording, nominal, theta_s) -> tuple[Complex, np.ndarray]:
     """Stator-frame voltage (n,) complex [V] in force after each sample, and the bus voltage (n,) [V]."""
     r, n, delay = recording, len(recording), nominal.control.duty_applied_after_samples
     u_dc = r["u_dc"] if r.has("u_dc") else np.full(n, float(nominal.inverter.dc_bus_v))
     u_dc_mid = np.append(0.5 * (u_dc[1:] + u_dc[:-1]), u_dc[-1])
     turns = np.exp(2j * np.pi / 3 * np.arange(3))
     if "inverter" in r.lacks:  # measured means of the interval after each sample (emf.py)
-        return (2 / 3) * (np.stack([r["u_a"], r["u_b"], r["u_c"]], axis=1) @ turns), u_dc_mid
-    asked = np.full(n, np.nan + 0j)
+        measured: Complex = np.stack([r["u_a"], r["u_b"], r["u_c"]], axis=1) @ turns
+        return (2 / 3) * measured, u_dc_mid
+    asked: Complex = np.full(n, np.nan + 0j)
     if r.has("d_a", "d_b", "d_c"):
         duties = np.stack([r["d_a"], r["d_b"], r["d_c"]], axis=1)
         asked[delay:] = ((2 / 3) * (duties @ turns))[: n - delay]

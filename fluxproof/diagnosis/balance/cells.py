@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """From rows to cells: the misfit and every effect's column as harmonics of a block.
 
 The same linear functional, mean(x exp(-j h theta)), is applied to the misfit and to every column, so that the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Basis functions of the free curves."""
 
 import numpy as np

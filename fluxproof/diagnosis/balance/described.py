@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What a drive file describes beyond a linear machine: an improved drive given back as the drive to diagnose.
 
 Saturation, iron loss, dead time and the like stand in [machine], [plant.machine] and [plant.inverter].  They belong to

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Which blocks of a recording are held out of the fit, to see whether what was found predicts them."""
 
 from __future__ import annotations

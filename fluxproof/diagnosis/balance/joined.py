@@ -1,6 +1,9 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Several recordings of one drive as one view, and how far drifts have gone in each of them."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +24,7 @@ def joined_views(views: list[View]) -> View:
     offsets_t = np.cumsum([0.0, *(v.span_s for v in views)])
     slow = np.cumsum([0.0, first.span_s, *(v.span_s if v.span_s >= first.span_s else 0.0 for v in views[1:])])
     offsets_run = np.cumsum([0, *(v.run.max() + 1 for v in views)])
-    stack = {name: np.concatenate([getattr(v, name) for v in views]) for name in first.stacked}
+    stack: dict[str, Any] = {name: np.concatenate([getattr(v, name) for v in views]) for name in first.stacked}
     if any(v.lacks is not None for v in views):
         stack["lacks"] = np.concatenate([lacking((), len(v)) if v.lacks is None else v.lacks for v in views])
     for name in ("i_abc", "mean_duty"):

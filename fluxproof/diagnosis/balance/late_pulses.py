@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Samples that do not lie in the zero vector between the pulses see the ripple of the pulses.
 
 A leg is high from (1 - d) / 2 to (1 + d) / 2 of its period, from whose begin to the share s it has been high for

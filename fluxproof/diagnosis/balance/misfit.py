@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The misfit of the nominal drive: the sampled flux balance, the current sum and the torque balance.
 
     u:      u_mean - R mean(i) - [psi_s(i+, theta+) - psi_s(i, theta)] / T, in dq at the middle angle

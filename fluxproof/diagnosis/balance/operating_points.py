@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Which blocks share an operating point, and when the flux linkage of such points changed at once."""
 
 from __future__ import annotations
@@ -5,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.balance.misfit import misfit
+from fluxproof.diagnosis.ground.arrays import Complex
 
 NEAR = 0.08  # of the highest speed and of rated current: visits that are compared when an instant is searched
 LEAST_SHARE = 0.05  # of the square of the flux voltage, in points that are visited before and after an instant
@@ -53,7 +55,8 @@ def _searched(view) -> tuple[float | None, int]:
     omega = view.omega.mean(axis=1)[order]
     point = point_numbers(view, NEAR)[order]
     count = np.bincount(point)
-    change = misfit(view)["u"].imag.mean(axis=1)[order]
+    u: Complex = misfit(view)["u"]
+    change = u.imag.mean(axis=1)[order]
     change = change - (np.bincount(point, change) / count)[point]
     # Of what a step after block n explains: its product with the misfit, and its square less what the means take.
     product = np.cumsum(change[::-1] * omega[::-1])[::-1]

@@ -1,13 +1,16 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Rows of the balance as complex amplitudes of one order, a value for each block."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.arrays import Complex
+
 LEAST_ROOM = 0.2  # least 1 - |leakage|^2 of the constant into a harmonic: with less the block holds no whole wave
 
 
-def at_order(cells, values, order):
+def at_order(cells, values, order) -> Complex:
     """Values (r,) of channel u at an order as complex (b,), nan in blocks that do not resolve it."""
     rows = (cells.channel == "u") & (cells.order == order)
     out = np.full(cells.block.max() + 1, np.nan + 0j)
@@ -18,7 +21,7 @@ def at_order(cells, values, order):
     return out
 
 
-def harmonic(view, cells, values, order):
+def harmonic(view, cells, values, order) -> Complex:
     """``at_order`` of a harmonic without the leakage of the constant, complex (b,): blocks are no whole turns.
 
     The least-squares amplitude beside a constant in the block.

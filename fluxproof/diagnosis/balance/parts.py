@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Several recordings of one drive: a part that cannot be used costs only that part.
 
     loaded = sound(loaded, nominal, CATALOGUE)  # of the rest, a finding names the parts that were left out and why

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Rows that are operating points, as stretches; rows of a long operating point are averaged.
 
 If most rows of a log resemble a neighbour, the others are transients and are left out.
@@ -52,8 +53,9 @@ def point_rows(recording, nominal) -> Stretches:
     temp = r["temp_winding"] if r.has("temp_winding") else np.full(len(t), np.nan)
     groups = _groups(t, (omega, nominal_u, u), good, float(t[-1]) / MEANS)
     first, end = np.array([g[0] for g in groups]), np.array([g[-1] + 1 for g in groups])
-    means = [np.array([np.mean(x[g]) for g in groups]) for x in (i, u, omega, u_dc, temp, t)]
-    return Stretches(*means, first, end, np.zeros(len(groups)), rest[first], 0.0, both_axes, notes)
+    i, u, omega, u_dc, temp, t = (np.array([np.mean(x[g]) for g in groups]) for x in (i, u, omega, u_dc, temp, t))
+    unsteady = np.zeros(len(groups))
+    return Stretches(i, u, omega, u_dc, temp, t, first, end, unsteady, rest[first], 0.0, both_axes, notes)
 
 
 def block_points(recording, nominal, catalogue: dict | None = None) -> Stretches:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the codes of an encoder leave in the balance: a beat with the sampling.
 
 An angle in steps q of a shaft at constant speed is a sawtooth, harmonics m = 1, 2, ... of the amplitude q / (pi m) at

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Excludes the start of a recording in which the drive is still settling.
 
 A recording often starts with the drive, so that its first block contains the end of a step response.  The current is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What a recording contains about its shaft: a torque transducer, a freely rotating shaft, or nothing.
 
 Without a transducer, the mechanical balance J d omega_m / dt = T - B omega_m - T_load is valid only if the speed is not

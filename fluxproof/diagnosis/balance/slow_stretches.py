@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Steady stretches of a slow log, for which a voltage balance can be made although samples are far apart.
 
 A slow log, such as that of a CAN bus, holds every value until the next message or interpolates between two messages.
@@ -15,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.arrays import Complex
 from fluxproof.diagnosis.ground.recording import Recording, RecordingError
 
 SIGNALS = ("i_d", "i_q", "u_d", "u_q", "omega")
@@ -41,8 +43,8 @@ class Stretches:
     change of the voltage from shortly before to shortly after the stretch [V].  rest: angle of a rotor at rest [rad],
     nan if it turns; both_axes: whether u_d is known, otherwise it is that of the nominal drive."""
 
-    i: np.ndarray
-    u: np.ndarray
+    i: Complex
+    u: Complex
     omega: np.ndarray
     u_dc: np.ndarray
     temp: np.ndarray
@@ -90,7 +92,7 @@ def stretches(recording: Recording, nominal) -> Stretches:
         if points >= ENOUGH:
             break
     if best is None:
-        raise refused
+        raise refused or RecordingError(f"{recording.source}: no steady stretch")
     return best[1]
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A View of a slow log: every steady stretch becomes one block, which represents an operating point.
 
 The rows of such a block are synthetic: constant current, voltage and speed over a few sampling periods, so that cells,
@@ -22,6 +23,7 @@ from fluxproof.diagnosis.balance.point_rows import block_points, point_rows
 from fluxproof.diagnosis.balance.slow_stretches import Stretches, stretches
 from fluxproof.diagnosis.balance.view import STACKED, View, lacking
 from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.arrays import Complex
 from fluxproof.diagnosis.ground.recording import Recording
 
 ROWS = 36  # one turn in steps of ten degrees: the mean inverter loss is accurate to 0.1 %
@@ -118,7 +120,8 @@ def view_of_points(found: Stretches, recording, nominal, catalogue: dict | None 
     if "time" in lacks and np.ptp(found.temp[order]) > BIN_TEMP_K:  # rows of a table from the coldest to the hottest
         lacks, course = lacks - {"time"}, (found.temp[order] - found.temp.min()) / np.ptp(found.temp)
     held = lambda x, n: np.repeat(np.asarray(x)[order, None], n, axis=1)  # noqa: E731
-    i, omega = held(found.i, ROWS + 1), held(found.omega, ROWS + 1)
+    i: Complex = held(found.i, ROWS + 1)
+    omega = held(found.omega, ROWS + 1)
     least = NO_CURRENT * nominal.machine.rated_current_a
     known = np.where(np.abs(found.i.real).max() > least, i.real, 0.0)
     known = known + 1j * np.where(np.abs(found.i.imag).max() > least, i.imag, 0.0)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The order at which a torque repeats with the rotor angle, and the orders at which torque is evaluated.
 
 The number of cogging periods per mechanical turn is the least common multiple of slots and poles, which the drive file

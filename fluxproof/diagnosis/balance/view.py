@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Blocks of rows at steady operating points, from which every effect computes its columns.
 
 Row k of a block is the interval from sample k to k+1.  The current of a regressor is a parabola over the block: the
@@ -16,6 +17,8 @@ import numpy as np
 from fluxproof.diagnosis.balance.curves import parabola
 from fluxproof.diagnosis.balance.shaft import FREE
 from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.arrays import Complex
+from fluxproof.diagnosis.ground.nominal import Nominal
 
 # What is computed from the angle alone stays known in a copy with the same angle.
 OF_THE_ANGLE = ("half_turn", "mid_turn", "turn", "theta_mid", "interval_angle")
@@ -42,14 +45,14 @@ class View:
     late_s: shift of the middle of every pulse [s] due to the dead time found so far
     """
 
-    nominal: object
+    nominal: Nominal
     sample_time_s: float
     theta: np.ndarray
     omega: np.ndarray
-    i: np.ndarray
-    i_raw: np.ndarray
+    i: Complex
+    i_raw: Complex
     i_abc: np.ndarray | None
-    u: np.ndarray
+    u: Complex
     u_dc: np.ndarray
     t: np.ndarray
     course: np.ndarray
@@ -176,7 +179,7 @@ class View:
     def duties(self):
         """Duties of the legs in the intervals -1 .. m, (b, m+2, 3), without noise."""
         turn = np.exp(1j * self.interval_angle)
-        u = parabola(self.u * np.conj(turn)) * turn / self.u_dc.mean(axis=1)[:, None]
+        u: Complex = parabola(self.u * np.conj(turn)) * turn / self.u_dc.mean(axis=1)[:, None]
         legs = (u[..., None] * np.exp(-2j * np.pi / 3 * np.arange(3))).real
         if self.mean_duty is None:
             mean = 0.5 - 0.5 * (legs.max(axis=2) + legs.min(axis=2))

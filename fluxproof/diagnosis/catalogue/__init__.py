@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The catalogue of effects: every module in this folder that defines EFFECT is an entry."""
 
 import importlib

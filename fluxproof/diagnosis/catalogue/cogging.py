@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Cogging torque: a function of the rotor angle alone, at multiples of the numbers of slots and poles."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Cross-saturation: both fluxes are derivatives of one mixed co-energy, which is even in i_q (reciprocity)."""
 
 import numpy as np

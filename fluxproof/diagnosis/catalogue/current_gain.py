@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Unequal gains of the current sensors."""
 
 import numpy as np

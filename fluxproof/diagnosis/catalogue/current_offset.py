@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Offsets of the current sensors."""
 
 import numpy as np
@@ -47,8 +48,8 @@ class CurrentOffset(Effect):
         return float(np.max(np.abs(self._phases(c))))
 
     @staticmethod
-    def _phases(c, suffix=""):
-        return sum(c.get(name + suffix, 0.0) * np.array(w) for name, w in PATTERNS.items())
+    def _phases(c, suffix="") -> np.ndarray:
+        return sum((c.get(name + suffix, 0.0) * np.array(w) for name, w in PATTERNS.items()), np.zeros(3))
 
     def corrected(self, view, c):
         course = view.course[:, None, None]

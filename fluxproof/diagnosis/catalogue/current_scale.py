@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A common gain error of all current sensors.
 
 The coefficient is the share a of the measured current that is not there, i = (1 - a) i_measured, since the balance is

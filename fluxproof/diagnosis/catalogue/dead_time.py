@@ -1,4 +1,7 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Voltage loss of the inverter: dead time and device drops, and how both vanish near zero current."""
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -94,7 +97,7 @@ class DeadTime(Effect):
     def free(self, view):
         # Bumps instead of more ramps: a ramp between two others is nearly their mean.
         places = [k for k in range(1, len(KNOTS) - 1) if KNOTS[k] not in WIDTHS]
-        shapes = {f"bump_{KNOTS[k]:g}": lambda x, k=k: _bump(x, _around(KNOTS[k])) for k in places}
+        shapes: dict[str, Callable] = {f"bump_{KNOTS[k]:g}": lambda x, k=k: _bump(x, _around(KNOTS[k])) for k in places}
         shapes["growth"] = lambda x: np.sign(x) * np.interp(np.abs(x), STILL_GROWS, (0.0, 1.0))
         out = _following_bus(view, _leg_losses(view, shapes))
         out |= device_tails(view)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The duties take effect later than assumed: the voltage is that of an earlier row.
 
 Either the mean of a period is late, as with a modulator that interpolates, or all pulses are and the samples see

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Magnets that lose a part of their flux at once, as after a pulse of negative i_d on a hot rotor: omega psi_step."""
 
 import numpy as np

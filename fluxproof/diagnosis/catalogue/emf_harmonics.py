@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Harmonics of the magnet flux: orders 6 and 12 in dq, proportional to speed, also at zero current."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Encoder eccentricity: an angle error that repeats with the mechanical turn."""
 
 import numpy as np

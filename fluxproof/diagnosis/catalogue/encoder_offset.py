@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Constant offset of the measured angle."""
 
 import numpy as np

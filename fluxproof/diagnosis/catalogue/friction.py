@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Friction: a torque against the motion that depends on the speed alone."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """d-axis inductance that differs from the nameplate: omega i_d on the q axis."""
 
 import numpy as np

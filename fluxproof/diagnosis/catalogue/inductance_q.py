@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """q-axis inductance that differs from the nameplate: -omega i_q on the d axis."""
 
 import numpy as np

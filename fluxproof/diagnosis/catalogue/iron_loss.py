@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Iron loss: a current j omega psi / R_fe in parallel with the magnetising current; R_fe may depend on frequency.
 
 The loss current may also lag by a time, as eddy currents do, and then weakens the flux in proportion to omega^2.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Magnet flux linkage that differs from the nameplate: omega psi_m on the q axis."""
 
 import numpy as np

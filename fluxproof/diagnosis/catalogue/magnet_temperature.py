@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Warming magnets: omega psi_m (1 + alpha_m (T_m - T_ref)), a slow drift, since the rotor temperature is unknown."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Unequal phase resistances."""
 
 import numpy as np
@@ -30,8 +31,8 @@ class PhaseResistanceAsymmetry(Effect):
         return float(np.hypot(c["alpha"], c["beta"]))
 
     @staticmethod
-    def _phases(c):
-        return sum(c[name] * np.array(w) for name, w in PATTERNS.items())
+    def _phases(c) -> np.ndarray:
+        return sum((c[name] * np.array(w) for name, w in PATTERNS.items()), np.zeros(3))
 
     def estimates(self, c, covariance, nominal):
         out = {}

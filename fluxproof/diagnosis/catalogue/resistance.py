@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Winding resistance that differs from the nameplate: u = R i."""
 
 from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, one, sigma, voltage

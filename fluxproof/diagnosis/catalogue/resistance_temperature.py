@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Warming winding: R (1 + alpha (T - T_ref)) with the measured temperature, or a free drift over time without one."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Currents are sampled tau after the middle of the zero vector: the EMF gives them a slope, the pulses a ripple."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Self-saturation: psi_d = f(i_d), psi_q = g(i_q), g odd; the curves are free."""
 
 import numpy as np
@@ -52,7 +53,8 @@ class Saturation(FluxEffect):
         x = np.linspace(0, 1, 21)
         bends = []
         for axis in "qd":
-            curve = sum(c.get(f"{axis}_{k}", 0.0) * x**p for k, p in (("2", 2), ("2s", 2), ("3", 3), ("5", 5)))
+            powers = (("2", 2), ("2s", 2), ("3", 3), ("5", 5))
+            curve = sum((c.get(f"{axis}_{k}", 0.0) * x**p for k, p in powers), np.zeros_like(x))
             bends.append(np.max(np.abs(curve - x * curve[-1])))
         return float(max(bends))
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Gain error of the measured bus voltage: it scales every voltage."""
 
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, one, sigma, voltage

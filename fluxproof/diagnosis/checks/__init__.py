@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Checks of a recording, one per file; every module in this folder with a ``check`` function is run.
 
 A check has a STAGE and ``check(recording, nominal)``, which edits the recording in place: it appends Problems, clears

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Ratio of the angle's advance to that of the speed, which reveals wrong units and signs (not itself a check).
 
     ratio = sum(dtheta omega T) / sum((omega T)^2)

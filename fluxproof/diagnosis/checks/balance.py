@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """How well the nominal machine fits the recording, with or without a change to its columns (not itself a check).
 
 For consecutive rows, with space vectors in the stator frame,
@@ -12,38 +13,57 @@ interpretation fits.  Slow logs, operating points and logs with dq values only u
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
+
+from fluxproof.diagnosis.ground.arrays import Complex, Real
+from fluxproof.diagnosis.ground.nominal import Machine
 
 MOST_ROWS = 5000
 FIT = 0.25  # misfit over voltage: any real effect is smaller at speed
 BETTER = 0.3  # a change is accepted if the misfit falls below this share
 LEAST_ROWS, LEAST_OF_TABLE = 20, 6  # fewer fit by chance with some change
 LEAST_POINTS, SAME = 3, 0.1  # of dq values: operating points that are so far apart, of rated current and top speed
-TURNS = np.exp(2j * np.pi / 3 * np.arange(3))
+TURNS: Complex = np.exp(2j * np.pi / 3 * np.arange(3))
+
+
+AnyRows = TypeVar("AnyRows", bound="_Intervals")
 
 
 @dataclass(frozen=True)
-class Rows:
-    """Samples at both ends of m intervals of length ``period`` [s].
+class _Intervals:
+    """Samples at both ends of m intervals of length ``period`` [s]: theta, omega (2, m)."""
 
-    i, d: (2, m, 3) phase currents [A] and (m, 3) duties in force, or None; dq: (2, m) complex dq current or None
-    u_dq: (m,) complex voltage reference or None; u_dc: (m,); theta, omega: (2, m)
-    """
-
-    machine: object
+    machine: Machine
     period: float
-    steady: bool
-    i: np.ndarray | None
-    dq: np.ndarray | None
-    d: np.ndarray | None
-    u_dq: np.ndarray | None
-    u_dc: np.ndarray | None
     theta: np.ndarray
     omega: np.ndarray
 
-    def change(self, **columns) -> Rows:
+    def change(self: AnyRows, **columns) -> AnyRows:
         return replace(self, **columns)
+
+
+@dataclass(frozen=True)
+class FastRows(_Intervals):
+    """i, d: (2, m, 3) phase currents [A] and (m, 3) duties in force; u_dc: (m,) [V]."""
+
+    i: Real
+    d: Real
+    u_dc: np.ndarray
+    steady = False
+
+
+@dataclass(frozen=True)
+class SteadyRows(_Intervals):
+    """dq: (2, m) complex dq current [A]; u_dq: (m,) complex voltage reference [V], d nan where not recorded."""
+
+    dq: Complex
+    u_dq: Complex
+    steady = True
+
+
+Rows = FastRows | SteadyRows
 
 
 def rows_of(recording, nominal) -> Rows | None:
@@ -61,21 +81,17 @@ def rows_of(recording, nominal) -> Rows | None:
     if dq_only and _points(columns["i_d"][k], columns["i_q"][k], columns["omega_e"][k], machine) < LEAST_POINTS:
         return None
     ends = np.stack([k, k if recording.points else k + 1])
-    i = d = dq = u_dq = None
-    if phases:
-        i_c = columns.get("i_c", -columns["i_a"] - columns["i_b"])
-        i = np.stack([columns["i_a"][ends], columns["i_b"][ends], i_c[ends]], axis=-1)
-    if duties:
-        d = np.stack([columns[name][k - delay] for name in ("d_a", "d_b", "d_c")], axis=-1)
-    if recording.has("i_d", "i_q"):
-        dq = columns["i_d"][ends] + 1j * columns["i_q"][ends]
-    if "u_q_ref" in columns:
-        u_d = columns["u_d_ref"][k - delay] if "u_d_ref" in columns else np.nan
-        u_dq = u_d + 1j * columns["u_q_ref"][k - delay]
-    u_dc = columns["u_dc"][k] if "u_dc" in columns else None
     # The steady balance does not use the angle.
     theta = columns["theta_e"][ends] if "theta_e" in columns else np.zeros(ends.shape)
-    return Rows(machine, nominal.sample_time_s, dq_only, i, dq, d, u_dq, u_dc, theta, columns["omega_e"][ends])
+    common = machine, nominal.sample_time_s, theta, columns["omega_e"][ends]
+    if dq_only:
+        u_d = columns["u_d_ref"][k - delay] if "u_d_ref" in columns else np.nan
+        dq = columns["i_d"][ends] + 1j * columns["i_q"][ends]
+        return SteadyRows(*common, dq, u_d + 1j * columns["u_q_ref"][k - delay])
+    i_c = columns.get("i_c", -columns["i_a"] - columns["i_b"])
+    i = np.stack([columns["i_a"][ends], columns["i_b"][ends], i_c[ends]], axis=-1)
+    d = np.stack([columns[name][k - delay] for name in ("d_a", "d_b", "d_c")], axis=-1)
+    return FastRows(*common, i, d, columns["u_dc"][k])
 
 
 def _points(i_d, i_q, omega, machine) -> int:
@@ -92,21 +108,21 @@ def misfit(rows: Rows, at_current: bool = False, at_d_current: bool = False) -> 
     those with a large d current.
     """
     m = rows.machine
-    if rows.steady:
+    if isinstance(rows, SteadyRows):
         i, omega = rows.dq.mean(axis=0), rows.omega.mean(axis=0)
         psi = m.inductance_d_h * i.real + 1j * m.inductance_q_h * i.imag + m.magnet_flux_wb
-        left = rows.u_dq - m.resistance_ohm * i - 1j * omega * psi
-        u = rows.u_dq
+        rest: Complex = rows.u_dq - m.resistance_ohm * i - 1j * omega * psi
+        left, u, at = rest, rows.u_dq, i
         if np.isnan(u.real).any():
-            left, u = left.imag, u.imag
+            left, u = rest.imag, u.imag
     else:
-        i_s = (2 / 3) * rows.i @ TURNS
+        i_s: Complex = (2 / 3) * rows.i @ TURNS
         turn = np.exp(1j * rows.theta)
-        i = i_s * np.conj(turn)
+        i, at = i_s * np.conj(turn), i_s[0]
         psi = (m.inductance_d_h * i.real + 1j * m.inductance_q_h * i.imag + m.magnet_flux_wb) * turn
         u = rows.u_dc * ((2 / 3) * rows.d @ TURNS)
         left = u - m.resistance_ohm * i_s.mean(axis=0) - (psi[1] - psi[0]) / rows.period
-    by = np.abs(i if rows.steady else i_s[0]) if at_current else np.abs(i.real if at_d_current else u)
+    by = np.abs(at) if at_current else np.abs(i.real if at_d_current else u)
     large = by >= np.percentile(by, 75 if at_current or at_d_current else 50)
     size = float(np.median(np.abs(u[large])))
     return float(np.median(np.abs(left[large]))) / size if size > 0 else np.inf
@@ -114,7 +130,7 @@ def misfit(rows: Rows, at_current: bool = False, at_d_current: bool = False) -> 
 
 def discriminates(rows: Rows) -> bool:
     """Whether the balance can discriminate interpretations: the EMF is well above the resistive drop."""
-    if rows.steady:
+    if isinstance(rows, SteadyRows):
         u = np.abs(np.where(np.isfinite(rows.u_dq), rows.u_dq, rows.u_dq.imag))
     else:
         u = np.abs(rows.u_dc * ((2 / 3) * rows.d @ TURNS))

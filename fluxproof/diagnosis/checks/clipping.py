@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Clipping: runs at exactly the largest or smallest value that the signal enters with a large slope.
 
 The top of a quantised sine is flat too, but its slope there is nearly zero: extrapolated over half the flat with the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Derive missing columns from others: speed from angle, a phase current from the other two, the bus voltage.
 
 Columns of zeros (channels that were logged but not connected) count as missing.
@@ -16,11 +17,10 @@ SPEED_ROWS = 32  # over which the angle is differentiated: the resolution of an 
 
 def check(recording, nominal) -> None:
     columns, notes = recording.columns, recording.meta["notes"]
-    for name in ("i_c", "i_d_ref", "i_q_ref", "temp_winding", "torque"):
+    for name in ("i_c", "temp_winding", "torque"):
         if name in columns and not np.any(columns[name]) and _moves(recording):
-            if name in ("temp_winding", "torque", "i_c"):
-                del columns[name]
-                notes.append(f"{name} is zero throughout and treated as not recorded")
+            del columns[name]
+            notes.append(f"{name} is zero throughout and treated as not recorded")
     if recording.has("i_a", "i_b", "i_c"):
         for name in ("i_a", "i_b"):
             _drop_dead(recording, name, nominal.machine.rated_current_a)

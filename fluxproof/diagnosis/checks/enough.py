@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Whether enough usable rows remain for a diagnosis."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """An angle in a few steps per turn, as Hall sensors give it: the balance, which turns with the angle, cannot use it."""
 
 from __future__ import annotations

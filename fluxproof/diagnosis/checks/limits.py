@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Impossible values: duties outside 0 to 1, a bus voltage at or below zero or far from drive.toml's."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Missing, infinite and absurd numbers: interpolated, and their rows excluded from every balance.
 
 Slow channels of a log merged from several rates are mostly empty; their last value is held.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Time that runs backwards and duplicate rows: sorted, appended as a new run, or removed."""
 
 from __future__ import annotations

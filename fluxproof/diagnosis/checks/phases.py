@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Swapped phases, reversed sensors, wrong rotation direction: the interpretation that the nominal machine fits is used.
 
 Every single change to the columns is tested with the nominal balance.  A change is accepted only if the recording does
@@ -11,8 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
-from fluxproof.diagnosis.checks.balance import BETTER, FIT, Rows, discriminates, misfit, rows_of
+from fluxproof.diagnosis.checks.balance import BETTER, FIT, Rows, SteadyRows, discriminates, misfit, rows_of
 from fluxproof.diagnosis.checks.rival_readings import CLEAR, best_reading, misfit_of
+from fluxproof.diagnosis.ground.arrays import Complex
 from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "geometry"
@@ -43,7 +45,7 @@ def check(recording, nominal) -> None:
     if as_is < (SMALL if at_current else FIT):
         return
     tried = {name: misfit_of(changed, at_current) for name, changed in changes.items()}
-    ranked = sorted(tried, key=tried.get)
+    ranked = sorted(tried, key=tried.__getitem__)
     best = ranked[0]
     n = len(recording)
     if tried[best] > BETTER * as_is or tried[best] > FIT:
@@ -54,7 +56,7 @@ def check(recording, nominal) -> None:
             recording.problems.append(Problem("no_fit", message, "", 0, n, "the recording is used unchanged"))
         return
     second = next((_words(name) for name in ranked[1:] if tried[name] < CLEAR * tried[best]), None)
-    if rows.steady:
+    if isinstance(rows, SteadyRows):
         rival, reading = best_reading(rows, nominal, at_current)
         if CLEAR * rival < tried[best]:  # conventions/ tells it
             return
@@ -71,9 +73,9 @@ def check(recording, nominal) -> None:
 
 def _changes(rows: Rows) -> dict[tuple, Rows]:
     """Every change that is tested, {change: changed rows}."""
-    if rows.steady:
+    if isinstance(rows, SteadyRows):
         return _dq_changes(rows)
-    changes = {("angle", ""): rows.change(theta=-rows.theta), ("sign", "i"): rows.change(i=-rows.i)}
+    changes: dict[tuple, Rows] = {("angle", ""): rows.change(theta=-rows.theta), ("sign", "i"): rows.change(i=-rows.i)}
     for name, order in ORDERS.items():
         changes["currents", name] = rows.change(i=rows.i[..., order])
         changes["duties", name] = rows.change(d=rows.d[..., order])
@@ -85,10 +87,10 @@ def _changes(rows: Rows) -> dict[tuple, Rows]:
     return changes
 
 
-def _dq_changes(rows: Rows) -> dict[tuple, Rows]:
+def _dq_changes(rows: SteadyRows) -> dict[tuple, Rows]:
     """The changes to dq values.  Without a d current the sign of one axis is that of both."""
     i, u = rows.dq, rows.u_dq
-    changes = {
+    changes: dict[tuple, Rows] = {
         ("speed", ""): rows.change(omega=-rows.omega),
         ("axes", "i_d i_q u_d_ref u_q_ref"): rows.change(dq=_swapped(i), u_dq=_swapped(u)),
         ("axes", "i_d i_q"): rows.change(dq=_swapped(i)),
@@ -105,7 +107,7 @@ def _dq_changes(rows: Rows) -> dict[tuple, Rows]:
     return changes
 
 
-def _swapped(dq):
+def _swapped(dq: Complex) -> Complex:
     return dq.imag + 1j * dq.real
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Samples that were dropped or written twice although the time advances evenly, found from the angle.
 
 The angle advances evenly.  A row in which it advances twice as far as before and after, or not at all with all
@@ -61,7 +62,7 @@ def _held(recording, advance, joined, period) -> bool:
     row, count = int(still[0]) + 1, len(still)
     if count <= CHANCE * _by_chance(recording):
         return False
-    slow = count > HELD * np.count_nonzero(turning)
+    slow = bool(count > HELD * np.count_nonzero(turning))
     if slow:
         recording.slow = True
         message = f"{count} rows repeat the previous one: sampled more slowly than the time column states"

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """How well the nominal machine fits steady dq values that are read otherwise (conventions/; not itself a check).
 
 A check must not correct what a reading explains as well: currents with the wrong sign are no frame that is turned.
@@ -9,14 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from fluxproof.diagnosis.checks.balance import Rows, misfit
+from fluxproof.diagnosis.checks.balance import Rows, SteadyRows, misfit
 from fluxproof.diagnosis.conventions.reading import Reading
 from fluxproof.diagnosis.conventions.table import readings_for
 
 CLEAR = 1.6  # least ratio of the misfits of the second best and the best hypothesis
 
 
-def best_reading(rows: Rows, nominal, at_current: bool = False) -> tuple[float, Reading]:
+def best_reading(rows: SteadyRows, nominal, at_current: bool = False) -> tuple[float, Reading]:
     """(misfit over voltage, reading) of the reading that fits steady rows best."""
     able = [r for r in readings_for(nominal) if r.dq is not False and r.bus == 1.0]
     tried = [misfit_of(as_read(rows, reading), at_current) for reading in able]
@@ -24,7 +25,7 @@ def best_reading(rows: Rows, nominal, at_current: bool = False) -> tuple[float, 
     return tried[best], able[best]
 
 
-def as_read(rows: Rows, reading: Reading) -> Rows:
+def as_read(rows: SteadyRows, reading: Reading) -> SteadyRows:
     """Steady rows under a reading."""
     turn = np.exp(-1j * reading.turn)
     machine = replace(rows.machine, **{key: getattr(rows.machine, key) * f for key, f in reading.machine.items()})

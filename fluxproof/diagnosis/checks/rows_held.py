@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A logger that is faster than what it records writes every row several times: one row of each is kept.
 
 Equal neighbours occur by chance too, in channels of few codes; a logger's come in a fixed rhythm.

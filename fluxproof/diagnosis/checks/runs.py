@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Runs of exactly equal values in a channel (not itself a check)."""
 
 from __future__ import annotations

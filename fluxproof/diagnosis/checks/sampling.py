@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Sample time against drive.toml: wrong unit, too few digits, gaps, a slow log, a wrong sample time.
 
 A row is joined to the next if the step equals the sample time.  A log slower than the control is marked slow and its

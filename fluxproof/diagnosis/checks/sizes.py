@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Wrong units that the magnitude of the values reveals: duties in percent, milliamps, millivolts, kelvin.
 
 Values are compared with the rated values of drive.toml, with a margin of a factor of 20.  If they exceed it and no
@@ -83,7 +84,7 @@ def _currents(recording, rated) -> None:
         # A unit applies to a sensor board: to all currents of a frame, unless the others differ in magnitude.
         _convert(recording, tuple(large), 1e-3, "mA")
         return
-    name = max(large, key=large.get)
+    name = max(large, key=large.__getitem__)
     times = f"{large[name] / rated:.0f} times rated_current_a = {rated:g} A"
     _refuse(recording, name, f"reaches {large[name]:.4g} A, {times}", large)
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Inconsistent angle and speed: a speed with a wrong scale or sign next to an electrical angle.
 
 If currents and duties rotate with the angle, the angle is used and the speed is corrected.  If the balance does not

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Stuck channels: constant while other channels show that they must change.
 
 A constant value alone is no fault: a supply is constant, and so is every signal of a simulated drive at rest.  A phase

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Phase currents that do not sum to zero: sensor offsets and gains, which the diagnosis identifies.
 
 Small sums are noted and not corrected.  A sum as large as the currents is no sensor error: one of the channels is a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A torque that is counted the other way: positive when the machine brakes, as a load's transducer may have it.
 
 The air-gap torque of the nominal machine, 3/2 p (psi_d i_q - psi_q i_d), has a sign that no friction or inertia hides

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Angles in degrees or turns, angles and speeds of the shaft, speeds in rpm: recognised by the fit and converted.
 
 Each unit of the angle is tested with the nominal stator balance; each unit of the speed with the advance of the angle,
@@ -12,7 +13,7 @@ import math
 import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
-from fluxproof.diagnosis.checks.balance import BETTER, FIT, discriminates, misfit, rows_of
+from fluxproof.diagnosis.checks.balance import BETTER, FIT, FastRows, SteadyRows, discriminates, misfit, rows_of
 from fluxproof.diagnosis.checks.rival_readings import CLEAR, best_reading, misfit_of
 from fluxproof.diagnosis.ground.recording import Problem
 
@@ -73,12 +74,12 @@ def _angle_unit(recording, nominal, p):
     if without_speed:
         del recording.columns["omega_e"]
     units = _angle_units(p)
-    if rows is not None and not rows.steady and discriminates(rows):
+    if isinstance(rows, FastRows) and discriminates(rows):
         as_is = _best_direction(rows, 1.0)
         if as_is <= FIT:
             return None
         tried = {unit: _best_direction(rows, factor) for unit, factor in units.items()}
-        best = min(tried, key=tried.get)
+        best = min(tried, key=tried.__getitem__)
         if tried[best] < min(FIT, BETTER * as_is):
             return best, units[best]
         return None
@@ -115,16 +116,16 @@ def _speed_unit(recording, nominal, p):
         ratios = {u: angle_speed_ratio(recording, period, 1.0, factor) for u, factor in units.items()}
         off = {u: abs(abs(ratio) - 1.0) for u, ratio in ratios.items() if ratio is not None}
         # The nearest: six pole pairs and the 2 pi of a frequency are 5 % apart.
-        nearest = min(off, key=off.get, default=None)
+        nearest = min(off, key=off.__getitem__, default=None)
         if nearest and off[nearest] < CLOSE:
             return nearest, units[nearest]
         return None
     rows = rows_of(recording, nominal)
-    if rows is None or not rows.steady or not discriminates(rows):
+    if not isinstance(rows, SteadyRows) or not discriminates(rows):
         return None
     as_is = _either_sign(rows, 1.0)
     tried = {unit: _either_sign(rows, factor) for unit, factor in units.items()}
-    ranked = sorted(tried, key=tried.get)
+    ranked = sorted(tried, key=tried.__getitem__)
     best = tried[ranked[0]]
     clear = len(ranked) < 2 or tried[ranked[1]] > 2 * best
     if not (as_is > 2 * FIT and best < min(FIT, BETTER * as_is) and clear):

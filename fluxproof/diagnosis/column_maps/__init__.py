@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Column maps for well-known logs, one file each; every module in this folder is used.
 
 A map has

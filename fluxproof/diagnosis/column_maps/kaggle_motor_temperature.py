@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Kaggle "Electric Motor Temperature", measures_v2.csv: 185 h of a 52 kW PMSM on a test bench at 2 Hz.
 
 Source: the data set's page (W. Kirchgässner, O. Wallscheid, J. Böcker, Paderborn University): u_d, u_q [V], i_d, i_q

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """LAAS omodri driver logs (T-Motor MN4004): position, velocity, i_q, u_q at 1 kHz.
 
 Source: the description of the recordings: Position [rad] and Velocity [rad/s] are those of the shaft, Vsupply is scaled

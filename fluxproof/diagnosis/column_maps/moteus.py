@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """moteus telemetry: the channels servo_stats and servo_control, or the registers of its Python library.
 
 Source: github.com/mjbots/moteus, fw/bldc_servo_structs.h (BldcServoStatus: d_A, q_A, electrical_theta, velocity,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """moteus registers as its Python library names them.
 
 Source: github.com/mjbots/moteus, the register list of its protocol: velocity in turns of the output shaft a

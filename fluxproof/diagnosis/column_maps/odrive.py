@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """ODrive properties logged under their own names (firmware 0.5 and 0.6).
 
 Source: ODrive's motor.hpp and foc.hpp: Id_measured, Iq_measured [A]; v_current_control_integral_d and _q [V] are

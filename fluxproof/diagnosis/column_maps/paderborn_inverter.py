@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Kaggle "Inverter Data Set": a two-level IGBT inverter with an induction motor, Paderborn University.
 
 Source: the data set's page and M. Stender, O. Wallscheid, J. Böcker, "Data set description: three-phase IGBT

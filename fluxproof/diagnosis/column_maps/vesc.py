@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """VESC Tool's realtime log (CSV, separated by semicolons).
 
 Source: the header of VESC Tool and compatible loggers, "ms_today;input_voltage;...;d_axis_voltage;

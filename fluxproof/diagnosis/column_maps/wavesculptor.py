@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """WaveSculptor motor controller over CAN, as the EMRAX 228 coast-down recording names its columns.
 
 Source: the controller's CAN messages (vectors of current, voltage and back-EMF; peak values) and the recording's own

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Mistaken conventions: ways to read a recording or a drive file otherwise than documented (interpret/ decides).
 
 reading.py  one such reading: what it changes in a view and in a recording

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Readings applied to a drive, a recording and a drive file."""
 
 from __future__ import annotations

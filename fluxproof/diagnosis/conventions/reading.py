@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One way to read a recording or a drive file otherwise than documented."""
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ class Reading:
 
     def keys(self, nominal) -> list[tuple[str, str, float]]:
         """[(section, key, value)] of the drive file that it changes."""
-        right = [("machine", "pole_pairs", self.pole_pairs)] if self.pole_pairs else []
+        right: list[tuple[str, str, float]] = [("machine", "pole_pairs", self.pole_pairs)] if self.pole_pairs else []
         return right + [("machine", key, getattr(nominal.machine, key) * f) for key, f in self.machine.items()]
 
     def of(self, nominal):

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The mistakes that people make with drive recordings and data sheets, one entry each.
 
 A new entry is a new line; of entries that leave the same balance the first is reported first.  Units that only the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What found effects change in the data: measurement errors are removed, the flux of the machine is added."""
 
 from __future__ import annotations

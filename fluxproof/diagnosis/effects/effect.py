@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Base class of the catalogue's effects, and the four ways in which physics enters the voltage balance.
 
 The misfit of a channel is the recorded value minus the one that the nominal drive needs:
@@ -199,7 +200,7 @@ class FluxEffect(Effect):
     def free(self, view):
         return {name: flux(view, psi) for name, psi in self.free_psi(view).items()}
 
-    def psi(self, view, c) -> np.ndarray:
+    def psi(self, view, c) -> np.ndarray | float:
         """The effect's flux linkage, (b, m+1) complex dq [Wb]."""
         shapes = {**self.core_psi(view), **self.free_psi(view)}
         return sum(value * shapes[name] for name, value in c.items() if value)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The example of ``fluxproof diagnose --example``: the core drives a motor that differs from its drive file.
 
 drive.toml    what the drive file says

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The example's hardware as it is, what its drive file does not know of it, and the operating points of the run."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The example's recording: the golden core in closed loop with the motor of motor.py, as the core's telemetry."""
 
 from __future__ import annotations

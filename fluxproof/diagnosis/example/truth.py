@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the diagnosis found beside what the example hides."""
 
 from __future__ import annotations

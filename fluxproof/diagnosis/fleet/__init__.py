@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Many recordings: what one says for a population, and what the population says.
 
 hypotheses  what a recording holds beside the spread of manufacture, each set of effects with its evidence

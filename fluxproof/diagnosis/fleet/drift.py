@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Change of a parameter over the recordings of one serial number: rate, when it was noticed, when it reaches a limit.
 
     x_k = a + b t_k + e_k,   e_k ~ N(0, (g s_k)^2),   g >= 1
@@ -102,7 +103,9 @@ def reached(line: Line, limit: float) -> tuple[float, float, float] | None:
     roots = np.roots([line.b**2 - q2 * c[1, 1], 2.0 * (d * line.b - q2 * c[0, 1]), d**2 - q2 * c[0, 0]])
     real = sorted(float(r.real) for r in roots if abs(r.imag) < 1e-9 * max(abs(r), 1.0))
     bounded = line.b**2 > q2 * c[1, 1] and len(real) == 2
-    return (float(at), *(real if bounded else (real[-1] if real else 0.0, np.inf)))
+    if bounded:
+        return float(at), real[0], real[1]
+    return float(at), real[-1] if real else 0.0, np.inf
 
 
 def drifts(series: dict, limits: dict[str, str] | None = None) -> list[Drift]:
@@ -111,7 +114,7 @@ def drifts(series: dict, limits: dict[str, str] | None = None) -> list[Drift]:
     limits: {parameter: value in its unit, or "95%" of the value at the first recording}.
     """
     limits = {**LIMITS, **(limits or {})}
-    ready = []
+    ready: list[tuple[tuple, list[datetime.datetime], np.ndarray, np.ndarray, np.ndarray, Line]] = []
     for key, points in sorted(series.items()):
         points = sorted(points)
         days = np.array([(p[0] - points[0][0]).total_seconds() / DAY_S for p in points])

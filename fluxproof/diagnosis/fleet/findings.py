@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What a fleet says, design by design: rates, populations, outliers, drifts, groups."""
 
 from __future__ import annotations
@@ -75,7 +76,7 @@ def _design(name, rows, limits) -> Design:
     present: dict[str, dict[str, float]] = defaultdict(dict)
     for serial, w in zip(serials, weighed, strict=True):
         mine = present[serial]
-        for effect, p in (w.present if outliers.explains(w) else {}).items():
+        for effect, p in (w.present if w is not None and outliers.explains(w) else {}).items():
             if effect not in beside[serial]:
                 mine[effect] = max(mine.get(effect, 0.0), p)
     series = defaultdict(list)

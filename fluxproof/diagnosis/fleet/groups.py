@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Recordings with the same unexplained remainder: an unknown effect that is seen often is a discovery.
 
 The signature of a remainder is a vector with a place for each signal and signed electrical order, whose squares are the
@@ -101,7 +102,8 @@ def _joining(faint, mine) -> list:
 
 def _lines(mine) -> list[Line]:
     """Places of the signature that half of the recordings have, the largest first."""
-    shares, sizes, units = defaultdict(list), defaultdict(list), {}
+    shares: dict[tuple[str, float], list[float]] = defaultdict(list)
+    sizes, units = defaultdict(list), {}
     for _, weighed, own in mine:
         for place, value in own.items():
             shares[place].append(value**2)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Effects of one recording beyond normal production tolerance: sets of effects with their evidence, for the fleet.
 
 No two drives have the same resistance, inductances and magnet flux, so these are in every set whether or not they reach

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Drives that differ from the rest of their fleet, and why.
 
 Two questions are asked of every drive.  Is a parameter outside of what the other drives predict (population.py)?  Of

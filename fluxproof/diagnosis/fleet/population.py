@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Mean, spread and shrunk values of a parameter over the drives of one design.
 
 Drive i has the true value theta_i ~ N(mu, tau^2); its recordings say x_i with the standard deviation s_i.  A drive that
@@ -64,7 +65,8 @@ def population(effect, parameter, unit, serials, x, s) -> Population | None:
     if len(x) < LEAST_DRIVES:
         return None
     centre = float(np.median(x))
-    scale = max(float(stats.median_abs_deviation(x, scale="normal")), float(np.median(s)), 1e-12 * abs(centre), 1e-300)
+    scatter = stats.median_abs_deviation(x, scale="normal")  # pyright: ignore[reportArgumentType]  # a word of scipy's
+    scale = max(float(scatter), float(np.median(s)), 1e-12 * abs(centre), 1e-300)
     u, e = (x - centre) / scale, s / scale
     mu, tau, epsilon, spread_sigma = _fitted(u, e)
     v = tau**2 + e**2

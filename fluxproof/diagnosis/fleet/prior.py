@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The population as prior of the next diagnosis: ``fluxproof diagnose --prior fleet.parquet``.
 
 What other drives of the same drive file had changes the prior odds of each effect, and places each parameter among

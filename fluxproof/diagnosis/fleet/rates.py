@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """How frequent each effect is in a fleet, and the posterior of every recording with these rates.
 
 Recording n has the evidence z_n(S) for each set S of extras.  Effect e is present in the share pi_e of the fleet:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A diagnosis as a row of fleet.parquet: what follows from recording and drive file alone (schema.py)."""
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ def failed_row(reason: str) -> dict:
     return {"reason": one_line(reason), "verdict": "bad_recording", "sentence": one_line(reason)}
 
 
-def one_line(text: str) -> str:
+def one_line(text: object) -> str:
     return writable(" ".join(str(text).split())[:REASON]) or "no reason given"
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The columns of fleet.parquet: name, type and meaning, declared once; docs/fleet.md shows the same table."""
 
 from __future__ import annotations

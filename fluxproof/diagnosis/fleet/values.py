@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Parameters of recordings and of drives, averaged over the sets of effects that are possible."""
 
 from __future__ import annotations

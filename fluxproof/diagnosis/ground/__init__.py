@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What every room of the diagnosis builds on.
 
 recording.py      a recording in canonical form; result.py, a diagnosis

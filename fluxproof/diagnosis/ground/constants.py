@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Every number that decides an answer and is a choice, with its unit and its reason; `make sensitivity` varies each.
 
 What only limits effort (how many sets are tried), grids and tolerances of a numerical step stand where they are used.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """How much time, memory and how many numbers one file may take, from its size alone.
 
 Numbers: a recording of a drive has at least two phase currents of one bit of news a row among at most eight columns, so

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A limit on the memory for reading one file.
 
 Readers check the sizes that a file declares (limits.py).  This limit catches the rest, such as compressed data that

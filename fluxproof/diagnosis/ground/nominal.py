@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The nominal drive: the parameters of the simulation, read from drive.toml.
 
 Every key of the core's drive.toml is accepted, but only those that the balance needs are required, so
@@ -13,58 +14,88 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from fluxproof.quote import shown
 from golden_model import drive
 from golden_model.drive_file import read_sections, read_tables
 from golden_model.drive_keys import DriveError, key_of
-
-REQUIRED = {
-    "machine": (
-        "pole_pairs", "resistance_ohm", "inductance_d_h", "inductance_q_h", "magnet_flux_wb", "rated_current_a",
-    ),
-    "inverter": ("dc_bus_v", "pwm_frequency_hz"),
-}  # fmt: skip
-
-# Ranges of drives without the core, whose formats allow less: {section: {key: (least, largest)}}.
-WIDER = {"machine": {"pole_pairs": (1, 1000)}, "sensors": {"adc_bits": (1, 32), "position_bits": (1, 32)}}
+from golden_model.front_ends import Converters, Encoder
 
 
-def _optional(section, kind):
-    """The section's dataclass in which only the required keys are mandatory, with the ranges of any drive."""
-    fields, wider = [], WIDER.get(section, {})
-    for f in dataclasses.fields(kind):
-        needed = f.name in REQUIRED.get(section, ())
-        default = dataclasses.MISSING if needed else None if f.default is dataclasses.MISSING else f.default
-        key = key_of(f)
-        if f.name in wider:
-            key = dataclasses.replace(key, lo=wider[f.name][0], hi=wider[f.name][1])
-        fields.append((f.name, f.type, dataclasses.field(default=default, metadata={"key": key})))
-    fields.sort(key=lambda entry: entry[2].default is not dataclasses.MISSING)
-    return dataclasses.make_dataclass(kind.__name__, fields, frozen=True)
+def _any_drive(kind: type, name: str, default: Any = dataclasses.MISSING, **limits: int) -> Any:
+    """A key of the core's section with another default or other ``limits`` (lo, hi): formats of the core allow less."""
+    key = next(key_of(f) for f in dataclasses.fields(kind) if f.name == name)
+    return dataclasses.field(default=default, metadata={"key": dataclasses.replace(key, **limits)})
+
+
+@dataclass(frozen=True)
+class Machine(drive.Machine):
+    """[machine] of any drive."""
+
+    pole_pairs: int = _any_drive(drive.Machine, "pole_pairs", lo=1, hi=1000)
+    rated_speed_rad_s: float | None = _any_drive(drive.Machine, "rated_speed_rad_s", None)
+
+
+@dataclass(frozen=True)
+class Inverter(drive.Inverter):
+    """[inverter] of any drive."""
+
+    dead_time_s: float | None = _any_drive(drive.Inverter, "dead_time_s", None)
+    min_pulse_s: float | None = _any_drive(drive.Inverter, "min_pulse_s", None)
+
+
+@dataclass(frozen=True)
+class Control(drive.Control):
+    """[control] of any drive."""
+
+    current_bandwidth_hz: float | None = _any_drive(drive.Control, "current_bandwidth_hz", None)
+
+
+@dataclass(frozen=True)
+class Sensors(drive.Sensors):
+    """[sensors] of any drive."""
+
+    adc_bits: int | None = _any_drive(drive.Sensors, "adc_bits", None, lo=1, hi=32)
+    current_range_a: float | None = _any_drive(drive.Sensors, "current_range_a", None)
+    u_dc_range_v: float | None = _any_drive(drive.Sensors, "u_dc_range_v", None)
+    position_bits: int | None = _any_drive(drive.Sensors, "position_bits", None, lo=1, hi=32)
+
+
+@dataclass(frozen=True)
+class Core(drive.Core):
+    """[core] of any drive."""
+
+    clock_hz: float | None = _any_drive(drive.Core, "clock_hz", None)
 
 
 RELUCTANCE = 0.05  # of the flux of rated current: with less the magnets do not count
 NO_MAGNETS = 1e-6  # the same, in place of no flux
 MOST_MAP_BYTES = 20_000_000  # of a flux map's CSV
 
-SECTIONS = {name: _optional(name, kind) for name, kind in drive.SECTIONS.items()}
+SECTIONS = drive.SECTIONS | {
+    "machine": Machine,
+    "inverter": Inverter,
+    "control": Control,
+    "sensors": Sensors,
+    "core": Core,
+}
 
 
 @dataclass(frozen=True)
 class Nominal:
     """The sections of drive.toml as objects with the attribute names of its keys, SI units, peak values."""
 
-    machine: object
-    inverter: object
-    control: object
-    sensors: object
-    core: object
-    bases: object
-    protection: object
-    sampling: object
-    encoder: object
-    converters: object
+    machine: Machine
+    inverter: Inverter
+    control: Control
+    sensors: Sensors
+    core: Core
+    bases: drive.BaseChoice
+    protection: drive.Protection
+    sampling: drive.Sampling
+    encoder: Encoder
+    converters: Converters
     columns: dict = field(default_factory=dict)
     path: str = ""
     plant: dict = field(default_factory=dict)
@@ -77,13 +108,13 @@ class Nominal:
         return self.control.sample_time_s or period / self.core.updates_per_period
 
 
-def flux_level(machine) -> float:
+def flux_level(machine: Machine) -> float:
     """Flux linkage [Wb] that limits the speed: of the magnets, or of rated current in a reluctance machine."""
     load = _load_flux(machine)
     return machine.magnet_flux_wb if machine.magnet_flux_wb > RELUCTANCE * load else load
 
 
-def _load_flux(machine) -> float:
+def _load_flux(machine: Machine) -> float:
     return max(machine.inductance_d_h, machine.inductance_q_h) * machine.rated_current_a
 
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The keys of the plant by section, their values from an effect or from [plant.*] of a drive file, and the flux map.
 
 The names are those of plant.Machine, plant.Inverter, plant.Sensors and of Timing below.  Where a section of the core
@@ -11,6 +12,7 @@ import difflib
 import io
 import warnings
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -61,7 +63,7 @@ def check_key(key: str) -> None:
         raise ValueError(f"{shown(key)} is not a key of the plant; the nearest known one is {near}")
 
 
-def plain(key: str, value):
+def plain(key: str, value) -> Any:
     """A value of TOML or of an effect in the type of the plant's field; ValueError for a wrong value."""
     check_key(key)
     if key == HARMONICS:

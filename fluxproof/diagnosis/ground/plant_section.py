@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The plant that a drive file describes: drive.toml with its [plant.*] sections.
 
 The core's own sections describe the machine and the inverter.  [sensors] describes the sensors as the core assumes
@@ -14,7 +15,7 @@ those of plant.Machine, plant.Inverter and plant.Sensors (plant_keys.py).  Three
 from __future__ import annotations
 
 import dataclasses
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -89,11 +90,12 @@ def plant_of(source) -> Plant:
     """(Machine, Inverter, Sensors, Timing) of a drive file's path or of a Nominal; DriveError as in load_nominal."""
     nominal = source if isinstance(source, Nominal) else load_nominal(source)
     given, chart = plant_given(nominal), flux_map_path(nominal)
+    usual: dict[str, Any] = {"inertia_kgm2": 1e-3}
     try:
         if chart is not None:
             given["machine"]["flux_map"] = read_flux_map(chart)
         return Plant(
-            Machine(**({"inertia_kgm2": 1e-3} | _described(nominal.machine, Machine) | given["machine"])),
+            Machine(**(usual | _described(nominal.machine, Machine) | given["machine"])),
             Inverter(**(_described(nominal.inverter, Inverter) | given["inverter"])),
             Sensors(**(described_sensors(nominal) | given["sensors"])),
             Timing(**given["timing"]),
@@ -102,7 +104,7 @@ def plant_of(source) -> Plant:
         raise DriveError(f"{nominal.path}: section [plant]: {error}") from None
 
 
-def _described(section, kind) -> dict:
+def _described(section, kind) -> dict[str, Any]:
     """The section's values under the plant's names; None selects the plant's default."""
     known = {f.name for f in dataclasses.fields(kind)}
     return {k: v for k, v in vars(section).items() if k in known and v is not None}

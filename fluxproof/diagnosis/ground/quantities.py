@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Numbers with units as an engineer writes them: 27 us and not 2.7e-05 s, 5.1 +- 0.1 V and not 5.0873 +- 0.0972 V.
 
 measured(2.7e-5, 3e-7, "s")          # "27.0 ± 0.3 µs", for the report

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A recording in canonical form: SI units, peak values, one row per control sample or per operating point.
 
 Canonical columns (only ``t`` is required here; columns.py checks what a balance needs):

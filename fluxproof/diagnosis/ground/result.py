@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The result of a diagnosis: plain dataclasses, converted for diagnosis.json by ``to_json``.
 
 The stable part follows docs/diagnosis.schema.json (schema 2).  ``Evidence`` serves the pictures only.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One generative model of the misfit and one posterior over sets of effects.
 
 y = sum over effects A_e c_e + discrepancy d + noise

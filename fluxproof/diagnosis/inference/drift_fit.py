@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The fit of drifts at one operating point: the change of the misfit over time and of every effect's columns.
 
 The mean over time is subtracted from both, after which an effect that does not drift has no columns left.
@@ -13,6 +14,7 @@ import numpy as np
 from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.balance.orders import at_order
 from fluxproof.diagnosis.ground import constants
+from fluxproof.diagnosis.ground.arrays import Complex
 from fluxproof.diagnosis.inference.fit import Fitter, Model
 
 DRIFTS = 0.1  # least change of a column over time relative to its size
@@ -45,9 +47,9 @@ def drifts(cells, centred, name, effect) -> bool:
     return not effect.corrects and any(size(centred, k) > DRIFTS * max(size(cells, k), 1e-30) for k in cores)
 
 
-def row_sigmas(view, cells, raw):
+def row_sigmas(view, cells, raw: Complex):
     """(r,) standard deviation [V]: of neighbouring means, and a share of the voltage for the balance itself."""
-    step = np.diff(raw) if len(raw) > 1 else np.zeros(1, complex)
+    step: Complex = np.diff(raw) if len(raw) > 1 else np.zeros(1, complex)
     each = [float(np.sqrt(np.nanmean(x**2) / 2.0)) for x in (step.real, step.imag)]
     own = constants.BALANCE_U * voltage_level(view) + constants.BALANCE_DC * view.nominal.inverter.dc_bus_v
     return np.hypot(np.array(each)[cells.part], own[cells.block])

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The marginal likelihood of a set of effects, with the sizes of the effects and of the discrepancy learnt (model.py).
 
 Expectation maximisation: coefficients at the present sizes, sizes at these coefficients, then the discrepancy of each

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Weighted least squares over cells: how well a set of effects explains a misfit, and with which coefficients.
 
 A model is a set of effects, each in its core or its free form.  Its score is chi^2 plus a penalty for every

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Linear model of a recording: rows, columns, linearisations, independent of the constants in constants.py.
 
 The steps of an inference are run by a function ``call(step, *arguments)``, by default ``at_once``.  A step is pure: its

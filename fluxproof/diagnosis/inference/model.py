@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The generative model of the misfit: rows, the columns of a set of effects, and what is found of both.
 
     y = X c + d + q + e

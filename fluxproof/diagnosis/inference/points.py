@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The rows of a balance, condensed: one mean per functional and operating point, and what differs between visits to it.
 
 A *functional* is one harmonic of one channel in one axis.  What no model has (the *discrepancy*) repeats in every
@@ -14,6 +15,7 @@ order by itself.  The contrasts carry the drifts.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,7 +46,7 @@ class Points:
     point: np.ndarray
     loads: int
     load: float
-    condensed: object  # function of further rows (r,): their means and contrasts (n,)
+    condensed: Callable[[np.ndarray], np.ndarray]  # function of further rows (r,): their means and contrasts (n,)
 
     def rows(self, y: np.ndarray | None = None, scale: np.ndarray | float = 1.0) -> BalanceRows:
         """The rows of the balance, with another misfit y (n,) and all errors times ``scale``, (n,) or 1."""

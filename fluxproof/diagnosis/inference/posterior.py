@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The posterior over sets of effects."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The linear problem of one view: columns of all effects as means of operating points, and their priors.
 
 A set of effects is first judged on the view as recorded.  Measurement errors (angle, currents, timing, bus) act on the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A set of effects on its own linearisation: the columns around the solution, until both agree."""
 
 from __future__ import annotations

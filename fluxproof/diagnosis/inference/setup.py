@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What all linear problems of a recording share: its rows, the error of their balance, and its operating points."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The table of a power analyser as dq values: a row per operating point, without an angle.
 
     u_line p_el          line-to-line voltage (fundamental) and electric power of the machine
@@ -16,6 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.arrays import Complex
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.ingest.demand import is_analysed
 
@@ -30,7 +32,7 @@ def dq_of_analyser(path, columns: dict, nominal, notes: list) -> dict:
         return columns
     m, measured = nominal.machine, {"i_d", "i_q"} <= set(columns)
     names = ("i_d", "i_q") if measured else ("i_d_ref", "i_q_ref")
-    i = columns[names[0]] + 1j * columns[names[1]]
+    i: Complex = columns[names[0]] + 1j * columns[names[1]]
     told = np.abs(i) > LEAST_CURRENT * m.rated_current_a
     if not measured and "i_line" in columns:
         i = np.where(told, i / np.maximum(np.abs(i), 1e-30) * columns["i_line"], i)
@@ -49,15 +51,16 @@ def dq_of_analyser(path, columns: dict, nominal, notes: list) -> dict:
     return kept | {"i_d": i.real, "i_q": i.imag, "u_d_ref": found.real, "u_q_ref": found.imag}
 
 
-def _voltage(u, phi, i, omega, told, machine):
+def _voltage(u, phi, i: Complex, omega, told, machine) -> Complex:
     """Complex dq voltages (n,) [V] of the magnitudes u, by the angle phi ahead of the current or behind it.
 
     Where the two are close, the machine that fits best to all points decides, which starts as the nominal one.
     """
     ahead, behind = (u * np.exp(1j * (np.angle(i) + sign * phi)) for sign in (1.0, -1.0))
     usual = np.array([machine.resistance_ohm, machine.inductance_d_h, machine.inductance_q_h, machine.magnet_flux_wb])
-    terms = usual * np.stack([i, 1j * omega * i.real, -omega * i.imag, 1j * omega * np.ones(len(i))], axis=1)
-    share, found = np.ones(4), None
+    terms: Complex = usual * np.stack([i, 1j * omega * i.real, -omega * i.imag, 1j * omega * np.ones(len(i))], axis=1)
+    share = np.ones(4)
+    found: Complex | None = None
     for _ in range(STEPS):
         needed = terms @ share
         chosen = np.where(np.abs(ahead - needed) < np.abs(behind - needed), ahead, behind)
@@ -66,7 +69,8 @@ def _voltage(u, phi, i, omega, told, machine):
             break
         found = chosen
         known = np.isfinite(found) & np.isfinite(needed)
-        left = (found - needed)[known]
+        left: Complex = (found - needed)[known]
         rows = np.concatenate([terms[known].real, terms[known].imag])
         share = share + np.linalg.lstsq(rows, np.concatenate([left.real, left.imag]), rcond=1e-6)[0]
+    assert found is not None  # STEPS is positive
     return found

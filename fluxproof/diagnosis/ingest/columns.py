@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Assigns file columns to canonical columns and units: by drive.toml first, then by known names.
 
 A column that the file lacks may be a constant of drive.toml (constants.py).
@@ -138,11 +139,12 @@ def _explicit(names, nominal, path) -> tuple[Plan, set[str]]:
     served = {entries[key]["name"] for key, column in found.items() if column is not None}
     for key, entry in entries.items():
         where = f"{nominal.path}: [columns] {shown(key)!r}"
-        if found[key] is None and entry["name"] in served - {""}:
+        column = found[key]
+        if column is None and entry["name"] in served - {""}:
             continue  # a column of another logger's files
-        if found[key] is None:
+        if column is None:
             raise RecordingError(f"{where} is not a column of {path}{nearest(key, names)}")
-        taken.add(found[key])
+        taken.add(column)
         if not entry["name"]:
             continue
         if entry["name"] in plan.sources:
@@ -151,9 +153,9 @@ def _explicit(names, nominal, path) -> tuple[Plan, set[str]]:
             )
         unit = entry.get("unit", "")
         if "factor" in entry or "offset" in entry:
-            source = Source(found[key], entry.get("factor", 1.0), entry.get("offset", 0.0), "", True)
+            source = Source(column, entry.get("factor", 1.0), entry.get("offset", 0.0), "", True)
         else:
-            source = _source(found[key], entry["name"], unit or _unit_of(found[key], names), nominal, where)
+            source = _source(column, entry["name"], unit or _unit_of(column, names), nominal, where)
         plan.sources[entry["name"]] = source
         plan.used = "[columns]"
     return plan, taken

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Which canonical columns a voltage balance requires.
 
 Four kinds of recordings contain enough: currents with commanded voltages, dq values of which u_d may be absent, the

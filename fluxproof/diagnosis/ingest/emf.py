@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """EMF runs: terminal voltages of a driven machine without current (gates off), as rows of a control period.
 
 An oscilloscope or a logger records three voltages against any common point, or two line-to-line voltages, at its own

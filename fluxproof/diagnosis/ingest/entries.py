@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One entry of [columns] of a drive.toml, checked."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Operating points as a recording: every row is one steady point, with or without a time.
 
 Without a time, rows are consecutive samples of a fast log or points of a table.  A table has no angle and no phase

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Columns that a recording lacks because they were constant: section [constants] of drive.toml.
 
     [constants]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Units of recordings, as factor and offset to the canonical SI unit of a column.
 
 canonical = raw * factor + offset.  A shaft quantity ("mech", "rpm", turns per second of the shaft) is multiplied

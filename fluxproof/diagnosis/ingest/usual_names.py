@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Usual names of the canonical columns, as test benches and controllers write them.
 
 A name counts in lower case, with "_" for spaces and dashes, by the last part of a path in a model ("Model

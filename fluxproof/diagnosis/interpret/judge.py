@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Which reading of recording and drive file the data prefer.
 
 Readings are judged as effects are, by the evidence for the balance that they leave: first without any effect, which is

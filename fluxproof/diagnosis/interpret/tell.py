@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The answer under the readings that the data prefer, with the misfit as it was documented."""
 
 from __future__ import annotations

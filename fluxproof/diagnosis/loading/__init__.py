@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A file becomes a checked recording.
 
 load.py      reads a file, maps its columns, checks it

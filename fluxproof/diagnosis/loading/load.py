@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Load a file as a checked canonical recording: read, map the columns, check.
 
     recording = load_recording("log.csv", load_nominal("drive.toml"))
@@ -89,9 +90,9 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
     columns = dq_of_analyser(path, columns, nominal, notes)
     if is_emf_run(columns):
         return emf_rows(path, columns, nominal, meta)
-    if ("t" not in columns or n == 1) and not table.meta.get("sample_time_s") and not plan.sample_time_s:
-        if is_table(columns, nominal):
-            return as_table(path, columns, meta, table.problems)
+    timeless = ("t" not in columns or n == 1) and not table.meta.get("sample_time_s") and not plan.sample_time_s
+    if timeless and is_table(columns, nominal):
+        return as_table(path, columns, meta, table.problems)
     if "t" not in columns:
         step = table.meta.get("sample_time_s") or plan.sample_time_s or nominal.sample_time_s
         columns["t"] = step * np.arange(n)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A drive file whose sample time is off by two, or with wrong pole pairs: the recording is read again with the right
 ones.
 
@@ -92,14 +93,17 @@ def fits(recording, nominal, restated) -> bool:
     if recording.fatal or recording.slow or recording.points:
         return False
     rows = rows_of(recording, nominal)
-    met = rows is not None and not rows.steady and discriminates(rows)
+    if rows is not None and (rows.steady or not discriminates(rows)):
+        rows = None  # it does not tell readings apart
     if restated.key == "pole_pairs":
         ratio = angle_speed_ratio(recording, nominal.sample_time_s)
         if "angle_speed" in recording.meta or ratio is None or abs(ratio - 1.0) > AGREES:
             return False
         # The angle of an EMF run is that of its voltages; else any effect may be left, as the ratio is the evidence.
-        return "inverter" in recording.lacks or (met and misfit(rows) < FIT)
-    turn = float(np.percentile(np.abs(rows.omega), 75)) * nominal.sample_time_s if met else 0.0
+        return "inverter" in recording.lacks or (rows is not None and misfit(rows) < FIT)
+    if rows is None:
+        return False
+    turn = float(np.percentile(np.abs(rows.omega), 75)) * nominal.sample_time_s
     return turn > VISIBLE * FITS and misfit(rows) < FITS
 
 

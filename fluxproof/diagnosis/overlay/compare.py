@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Closed-loop simulations for comparison with the recording, of the drive as described and of the improved one.
 
 The controller hides an effect from the currents, in the drive and in the simulation; the signal to compare is the
@@ -8,6 +9,7 @@ commanded voltage.  Speed, bus voltage and references are those of the recording
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +39,7 @@ def closed_loop(recording: Recording, nominal: Nominal, improved=None) -> dict:
     parts = stretches(recording, nominal)
     recorded = _recorded(recording, nominal)
     shown, block = _shown(parts, recording.slow)
-    result = {
+    result: dict[str, Any] = {
         "t": _blocks([recording["t"][p.rows[keep]] for p, keep in zip(parts, shown, strict=True)], block)
     }
     chosen = [recorded[p.rows[keep]] for p, keep in zip(parts, shown, strict=True)]
@@ -81,7 +83,7 @@ def _recorded(recording: Recording, nominal: Nominal) -> np.ndarray:
     currents = dq_currents(recording)
     if recording.has("d_a", "d_b", "d_c", "u_dc", "theta_e"):
         turned = recording["theta_e"] + _ahead(recording, nominal)
-        volts = dq(*(recording[f"d_{x}"] * recording["u_dc"] for x in "abc"), turned)
+        volts = dq(*(recording[f"d_{x}"] * recording["u_dc"] for x in "abc"), theta=turned)
     elif recording.has("u_d_ref", "u_q_ref"):
         volts = np.stack([recording["u_d_ref"], recording["u_q_ref"]], axis=1)
     else:

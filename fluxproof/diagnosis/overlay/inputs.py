@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Inputs of the overlay simulation: stretches of a recording with the signals that drive the simulation."""
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ def dq_currents(recording: Recording) -> np.ndarray:
     if recording.has("i_d", "i_q"):
         return np.stack([recording["i_d"], recording["i_q"]], axis=1)
     if recording.has("i_a", "i_b", "i_c", "theta_e"):
-        return dq(*(recording[f"i_{x}"] for x in "abc"), recording["theta_e"])
+        return dq(*(recording[f"i_{x}"] for x in "abc"), theta=recording["theta_e"])
     raise RecordingError(
         f"{recording.source}: i_d, i_q or i_a, i_b, i_c with theta_e are needed to simulate it"
     )
@@ -100,7 +101,7 @@ def _reference(recording, part, currents, k):
     return filled(recording[name][part]) if recording.has(name) else smooth(filled(currents[part, k]))
 
 
-def filled(values):
+def filled(values: np.ndarray) -> np.ndarray:
     """Replace values that are not finite by the last finite one, as a controller would; zero if there is none."""
     good = np.isfinite(values)
     if good.all():
@@ -109,9 +110,9 @@ def filled(values):
     return np.nan_to_num(values[np.maximum(last, int(np.argmax(good)))])
 
 
-def smooth(values):
+def smooth(values: np.ndarray) -> np.ndarray:
     """Local parabola over SMOOTH_ROWS rows around each row; shorter columns are unchanged."""
-    return savgol_filter(values, SMOOTH_ROWS, 2) if len(values) >= SMOOTH_ROWS else values
+    return np.asarray(savgol_filter(values, SMOOTH_ROWS, 2)) if len(values) >= SMOOTH_ROWS else values
 
 
 def _slow(recording, nominal, rows):

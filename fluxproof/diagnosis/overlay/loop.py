@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A float field-oriented controller in closed loop with the averaged plant, one row per control sample.
 
     u = kp (i_ref - i) + int,  int += ki T (i_ref - i)          held while the voltage is at its limit

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Reads a recording's file into a Table; the format is recognised by content and must agree with the file name.
 
 Files are untrusted: nothing in them is executed (no pickles, no formulas), links to other files are not followed, and

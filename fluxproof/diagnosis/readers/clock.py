@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Dates and clock times as seconds from the first one, so that no digit of a small step is lost in a large date."""
 
 from __future__ import annotations

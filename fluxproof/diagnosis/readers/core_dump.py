@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The core's own telemetry dump, which diagnosis/replay/telemetry.py decodes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """HDF5 files: every numeric data set of the common length is a column, in any group.
 
 The last part of a data set's path is its name if that is unique.  Units come from an attribute "unit" or "units";
@@ -34,7 +35,7 @@ def read(path, select=None) -> Table:
         arrays, longest, cells = {}, 0, 0
         for name in names:
             dataset, pick = places[name]
-            longest = max(longest, max(dataset.shape))
+            longest = max(longest, *dataset.shape)
             cells += min(limit, max(dataset.shape))
             check_cells(path, cells, f"data set {shown(dataset.name)}")
             check_readable(dataset, path)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What an HDF5 file contains, found without following it anywhere else (not itself a reader).
 
 h5py would open other files that a link, an external data set or a virtual one names, and load a plugin for a filter
@@ -111,8 +112,8 @@ def _links(group, path) -> list[str]:
 
 
 def _address(identifier) -> tuple:
-    import h5py
+    from h5py import h5o  # pyright: ignore[reportAttributeAccessIssue]  # compiled, without types
 
-    info = h5py.h5o.get_info(identifier)
+    info = h5o.get_info(identifier)
     return info.fileno, info.addr
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """MATLAB .mat files of versions 5 to 7.3, read with pymatreader (scipy below 7.3, h5py for 7.3).
 
 Structures are flattened: "run.i_a".  Lists of named signals as in dSPACE ControlDesk (X, Y(k).Name, Y(k).Data) and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """MDF measurement files (.mf4, .mdf), read with asammdf.
 
 Channels on several rasters are resampled to one: that of the requested channel with the most samples, which in a
@@ -10,6 +11,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+from typing import Any
 
 import numpy as np
 
@@ -41,7 +43,8 @@ def read(path, select=None) -> Table:
     if str(path).lower().endswith((".zip", ".mf4z")):  # the name alone would make asammdf unpack it
         raise RecordingError(f"{path}: packed; unpack it first")
     check_chains(path)
-    with _no_evaluation(), MDF(path, process_bus_logging=False, use_display_names=False) as mdf:
+    options: dict[str, Any] = {"process_bus_logging": False, "use_display_names": False}
+    with _no_evaluation(), MDF(path, **options) as mdf:
         places, units = _channels(mdf)
         wanted = [name for name in chosen(units | {TIME: "s"}, select, path) if name != TIME]
         if not wanted:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The lists of groups and channels of an MDF file, followed before asammdf does (not itself a reader).
 
 A list that leads back into itself would keep asammdf busy without an end.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """From the raw values of an MDF channel to physical ones, by the coefficients of its conversion (not itself a reader).
 
 asammdf hands a formula of the file to numexpr or sympy, which run it as Python.  So the channels are read raw, and the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """NumPy files: .npz with one array per column, .npy with named fields or a plain matrix.
 
 Pickles are never loaded, since loading one runs its code.  A matrix without names has the columns "1", "2", ...

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Parquet files, read with pyarrow."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The layout of a text table: separator, decimal mark, header, units, first line of numbers.
 
 Every pair of separator and decimal mark is tested on the first lines; the one that gives the most numbers in lines

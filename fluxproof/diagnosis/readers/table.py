@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The result of every reader: named numeric columns of one length, with units and line numbers.
 
 A reader is one file in this folder with

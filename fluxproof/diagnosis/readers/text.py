@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """CSV and other text tables: any separator, decimal point or comma, header with units, comments, no header.
 
 pandas reads the numbers; sniff.py finds the layout.  Without a header the columns are called "1", "2", ...
@@ -8,6 +9,7 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +17,9 @@ from fluxproof.diagnosis.ground.recording import Problem, RecordingError
 from fluxproof.diagnosis.readers.clock import moments
 from fluxproof.diagnosis.readers.sniff import half_zero, sniff
 from fluxproof.diagnosis.readers.table import Table, chosen, repeated, row_limit, shown, too_long
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FORMAT = "text"
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
@@ -102,14 +107,14 @@ def read(path, select=None) -> Table:
 class _Column:
     """raw: pandas Series; numbers: (n,), NaN where there is none; words: (n,) bool, where there is a word instead."""
 
-    raw: object
+    raw: pd.Series
     numbers: np.ndarray
     words: np.ndarray
     moment: bool = False
 
     @property
     def text(self) -> bool:
-        return np.count_nonzero(self.words) > MOSTLY_TEXT * len(self.words)
+        return bool(np.count_nonzero(self.words) > MOSTLY_TEXT * len(self.words))
 
 
 def _numbers(values, decimal, pd) -> _Column:
@@ -149,6 +154,7 @@ def _leave_out_headers(table: Table, columns, layout) -> None:
     between = np.all([c.words for c in given], axis=0)
     if not between.any():
         return
+    assert table.lines is not None  # a text file has them
     row = int(np.argmax(between))
     names = [str(c.raw.iloc[row]).strip() for c in columns.values()]
     what = "repeats the header: another file was appended" if names == list(columns) else "is a line of words"
@@ -168,6 +174,7 @@ def _take(table: Table, name: str, column: _Column) -> None:
     table.columns[name] = column.numbers
     words = np.flatnonzero(column.words)
     if len(words):
+        assert table.lines is not None  # a text file has them
         row = int(words[0])
         table.problems.append(
             Problem(

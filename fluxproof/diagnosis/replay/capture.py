@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Telemetry of a simulation: the golden model in closed loop with the averaged plant, all signals recorded.
 
 The same data as a test bench receives from the core over AXI4-Stream.

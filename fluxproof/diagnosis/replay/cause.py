@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The cause of a difference between replay and recording: a search over single wrong bits or register digits.
 
 The recorded values show where the difference appears; its origin may be hidden, because the core does not output every
@@ -68,7 +69,8 @@ def find_cause(run: Run, state, start: int, stop: int, row: int, names: list[str
     goal = min(stop, row + 1 + BEYOND)
     best, first = None, row
     for cause in _hypotheses(run, base, begin, row, names, whole_state and begin == start):
-        at = cause.run.patch[0] if cause.kind == "sample" else begin
+        patch = cause.run.patch
+        at = patch[0] if cause.kind == "sample" and patch is not None else begin
         reached, _, _ = cause.run.until_different(cause.state, at, goal)
         if reached == goal < stop:
             reached, _, _ = cause.run.until_different(cause.state, at, stop)
@@ -96,8 +98,10 @@ def _as_good(run: Run, cause: Cause, base, begin) -> tuple:
 def _hypotheses(run: Run, base, begin, row, names, whole_state):
     """Hypotheses with a single inverted bit, likely ones first; base: start state of their runs, from ``begin`` on."""
     for at, fields in ((row, fluxproof.Sample._fields), (row - 1, SHOWN_LATER)):
-        before = run.state_at(base, begin, at) if at >= begin else None
-        for name in fields if at >= begin else ():
+        if at < begin:
+            continue
+        before = run.state_at(base, begin, at)
+        for name in fields:
             k = fluxproof.Sample._fields.index(name)
             fmt, found = sample_latch.BLOCK.outputs[k].fmt, int(run.samples[at, k])
             for bit in range(fmt.width):
@@ -133,10 +137,10 @@ def _registers_near(run, names):
 def _states(base):
     """Every inverted bit of the state: (name, bit, value, changed value, changed state)."""
     for name, part in base._asdict().items():
-        for key, found in (part._asdict() if isinstance(part, tuple) else {"": part}).items():
+        for key, found in ({"": part} if isinstance(part, int) else part._asdict()).items():
             for bit in range(STATE_BITS):
                 acted = found ^ (1 << bit)
-                changed = part._replace(**{key: acted}) if key else acted
+                changed = acted if isinstance(part, int) else part._replace(**{key: acted})
                 yield f"{name}.{key}".rstrip("."), bit, found, acted, base._replace(**{name: changed})
 
 

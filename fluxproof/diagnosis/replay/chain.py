@@ -1,8 +1,9 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The golden model over recorded samples, compared with ``==``, compiled: a million samples take about a second."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -137,4 +138,9 @@ def _given(observed: dict, values: fluxproof.Registers) -> np.ndarray:
 
 def plain_state(state) -> fluxproof.State:
     """The state with Python integers, so that every call has the same types and is compiled once."""
-    return fluxproof.State(*(type(p)(*map(int, p)) if isinstance(p, tuple) else int(p) for p in state))
+    return fluxproof.State._make(map(_plain_part, state))
+
+
+def _plain_part(part):
+    kind: Any = type(part)
+    return kind(*map(int, part)) if isinstance(part, tuple) else int(part)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The digital part of a diagnosis: do the core's outputs equal those of its golden model?
 
 A telemetry dump contains the inputs and outputs of the core.  The golden model is replayed over the samples and every

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Which block drives which signal, in data-flow order, and the outputs of every block of the core in one sample.
 
 Everything is derived from fluxproof.WIRING, the declared ports of the blocks and fluxproof.step.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Checks without the core's state: blocks whose inputs are all in the recording.
 
 A recording that begins while the drive runs does not contain the integrators of the regulators, so that the whole core

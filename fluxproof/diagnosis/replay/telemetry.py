@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The core's telemetry dump: its inputs and outputs, sample by sample, bit for bit.
 
     8 bytes   MAGIC

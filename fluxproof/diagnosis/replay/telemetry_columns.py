@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Canonical columns of a telemetry dump: the converters' codes in SI units.
 
 Currents, bus voltage and angle are computed from the raw codes with the registers' offsets and gains, without rounding

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Converts a captured telemetry stream to a dump: the words of the core's AXI4-Stream packets as a DMA stores them.
 
     fluxproof dump capture.bin --drive drive.toml [--registers registers.json] [-o run.fluxdump]
@@ -114,7 +115,7 @@ def _whole_packets(raw: bytes, at: int) -> np.ndarray:
 
 def _sound(rows: np.ndarray) -> np.ndarray:
     """(n,) bool: every field is sign- or zero-extended as its format requires, and all other bits are zero."""
-    good = ~(rows & ~USED).any(axis=1)
+    good = np.asarray(~(rows & ~USED).any(axis=1))
     for field in LAYOUT.values():
         value = _values(rows, field)
         good &= (value >= field.port.fmt.lo) & (value <= field.port.fmt.hi)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Bar charts: the fit before and after, and the share of the misfit that each named effect explains."""
 
 from __future__ import annotations
@@ -5,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.answer.phrases import SIGNALS
+from fluxproof.diagnosis.ground.result import Fit
 from fluxproof.diagnosis.report import theme
 from fluxproof.diagnosis.report.maps import LeftOut
 from fluxproof.diagnosis.report.words import effect_text, explained, percent
@@ -12,7 +14,7 @@ from fluxproof.diagnosis.report.words import effect_text, explained, percent
 LONGEST = 34  # letters of a label beside a bar
 
 
-def fit_bars(fit) -> theme.Picture:
+def fit_bars(fit: Fit) -> theme.Picture:
     """rms misfit before and after, on fitted and on held-out points, with the noise floor."""
     rows = [
         ("held out, before", fit.holdout_before, theme.BEFORE),
@@ -29,8 +31,15 @@ def fit_bars(fit) -> theme.Picture:
         axis.annotate(f"{value:.3g} {fit.unit}", (value, place), (4, 0), textcoords="offset points", va="center")
     if np.isfinite(fit.noise_floor) and fit.noise_floor > 0.0:
         axis.axvline(fit.noise_floor, color=theme.INK, linewidth=1.1, linestyle=(0, (4, 2)))
-        at = dict(xycoords=("data", "axes fraction"), textcoords="offset points", va="bottom", fontsize=9)
-        axis.annotate(f"noise floor {fit.noise_floor:.3g} {fit.unit}", (fit.noise_floor, 1.0), (-2, 3), **at)
+        axis.annotate(
+            f"noise floor {fit.noise_floor:.3g} {fit.unit}",
+            (fit.noise_floor, 1.0),
+            (-2, 3),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            va="bottom",
+            fontsize=9,
+        )
     axis.set_yticks((0, 1, 2.5, 3.5), [name for name, _, _ in rows])
     axis.set(
         xlabel=f"rms misfit of {theme.plain(SIGNALS.get(fit.signal, fit.signal))} [{fit.unit}]", xlim=(0, 1.2 * top)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Line charts: misfit over time, harmonic orders.
 
 The arrays are those of diagnosis.result.Evidence; a drawing function raises KeyError if one is missing.
@@ -36,8 +37,16 @@ def over_time(e) -> theme.Picture:
         tops.append(noise)
     if "holdout" in e and e["holdout"].any():
         held = np.bincount(part, e["holdout"], len(rows)) > rows / 2
-        upright = dict(transform=axis.get_xaxis_transform(), color=theme.HELD, linewidth=0, zorder=-1)
-        axis.fill_between(np.repeat(edges, 2)[1:-1], 0, 1, where=np.repeat(held, 2), **upright)
+        axis.fill_between(
+            np.repeat(edges, 2)[1:-1],
+            0,
+            1,
+            where=np.repeat(held, 2),
+            transform=axis.get_xaxis_transform(),
+            color=theme.HELD,
+            linewidth=0,
+            zorder=-1,
+        )
     axis.set(title="Misfit", xlabel="time [s]", ylabel="V", xlim=(t[0], t[-1]), ylim=(0, 1.08 * max(tops) or 1.0))
     theme.key(axis, *names)
     caption = "Magnitude of the misfit vector over time. Vertical shading: intervals held out of every fit."

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Heat maps of the misfit: over electrical angle and current, and over the speed-current plane.
 
 The colour of a cell is the rms over its rows k of sqrt(e_d(k)^2 + e_q(k)^2), the magnitude of the dq misfit;
@@ -68,7 +69,7 @@ def _before_after(e, x, y, x_label: str, y_label: str, range_x=None):
     noise = np.sqrt(2.0) * float(np.ravel(e["noise"])[0]) if "noise" in e else 0.0  # of two axes
     top = max(float(np.nanpercentile(maps[0][0], 99)), QUIET * noise) or 1.0
     scale = Normalize(0.0, top)
-    figure, panels = theme.axes(1, len(shown), height=2.5, sharey=True, squeeze=False)
+    figure, panels = theme.panels(1, len(shown), height=2.5, sharey=True, squeeze=False)
     for axis, when, (values, edges_x, edges_y) in zip(panels[0], shown, maps, strict=True):
         image = _draw(axis, values, edges_x, edges_y, scale)
         axis.set(title=e.get("words", {}).get(when, when) if len(shown) > 1 else "misfit", ylim=_wider(spans[1]))

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The picture of the closed-loop simulation laid over the recording."""
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ def overlay(data: dict) -> theme.Picture:
     if any(len(values) != len(t) for columns in runs.values() for values in columns.values()):
         raise LeftOut("the overlay's columns differ in length")
     parts = [slice(None)] + ([_furthest_off(runs, names)] if len(t) > 2 * POINTS else [])
-    shape = dict(height=0.7 + 1.25 * len(names), sharex="col", sharey="row", squeeze=False)
-    figure, panels = theme.axes(len(names), len(parts), **shape)
+    height = 0.7 + 1.25 * len(names)
+    figure, panels = theme.panels(len(names), len(parts), height, sharex="col", sharey="row", squeeze=False)
     for row, name in zip(panels, names, strict=True):
         for axis, part in zip(row, parts, strict=True):
             for run, (color, width) in RUNS.items():

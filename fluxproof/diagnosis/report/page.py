@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The HTML report: the context of the template report.html, made from a Diagnosis.
 
 The page contains no script and loads nothing; Jinja escapes every text, so that names from a file remain text.

@@ -1,8 +1,10 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """All pictures of a report, and the reason for each one that cannot be drawn."""
 
 from __future__ import annotations
 
 import warnings
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -43,7 +45,7 @@ BLOCK_ARRAYS = (
 def draw(diagnosis, laid_over: dict | None) -> tuple[dict[str, theme.Picture], list[str]]:
     """(pictures by name, one line with the reason for each picture that is left out)."""
     drawn, left_out = {}, []
-    arrays = {name: np.asarray(values) for name, values in diagnosis.evidence.arrays.items()}
+    arrays: dict[str, Any] = {name: np.asarray(values) for name, values in diagnosis.evidence.arrays.items()}
     if diagnosis.verdict == "unexplained" and not diagnosis.effects:  # nothing is named, so there is no "after"
         arrays = {name: values for name, values in arrays.items() if "after" not in name}
     try:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Common style of all pictures, light and dark: colours are roles, which the page's style sheet defines.
 
 A figure is drawn with the light colours; in its SVG each becomes a CSS variable, so that the same picture
@@ -10,9 +11,12 @@ from __future__ import annotations
 import io
 import re
 from dataclasses import dataclass
+from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from markupsafe import Markup, escape
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fluxproof.quote import mathtext, visible
@@ -31,7 +35,7 @@ LIGHT = {
 }
 INK, SOFT, AXIS, GRID, BEFORE, AFTER, RECORDED, BAND, HELD, EMPTY = LIGHT.values()
 WIDTH = 4.7  # inches; narrow, so that 10-point text is legible on a phone of 400 px
-STYLE = {k: v for k, v in mpl.rcParamsDefault.items() if not k.startswith("backend")} | {
+STYLE: dict[Any, Any] = {k: v for k, v in mpl.rcParamsDefault.items() if not k.startswith("backend")} | {
     **{"font.size": 10.0, "text.color": INK, "axes.labelcolor": SOFT},
     **{
         "axes.titlesize": 10.5,
@@ -58,10 +62,16 @@ class Picture:
     caption: str
 
 
-def axes(*shape: int, height: float, **kwargs):
-    """(figure, axes) with the common width of all pictures."""
+def axes(height: float) -> tuple[Figure, Axes]:
+    """A figure of the common width of all pictures, with one pair of axes."""
     figure = Figure(figsize=(WIDTH, height), layout="constrained")
-    return figure, figure.subplots(*shape, **kwargs)
+    return figure, figure.subplots()
+
+
+def panels(rows: int, columns: int, height: float, **kwargs) -> tuple[Figure, np.ndarray]:
+    """The same with several pairs of axes, in the array that ``Figure.subplots`` makes of them."""
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    return figure, figure.subplots(rows, columns, **kwargs)
 
 
 def key(axis, *words: tuple[str, str]) -> None:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Texts of the report: the meaning of a verdict, formatted numbers and units, the description of an effect."""
 
 from __future__ import annotations
@@ -79,10 +80,10 @@ def span(low, high, unit: str) -> str:
 
 def brief(value) -> str:
     """A value in the notation of drive.toml; a long array by its shape and range."""
-    if dataclasses.is_dataclass(value):
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
         value = dataclasses.asdict(value)
-    if hasattr(value, "tolist"):
-        value = value.tolist()
+    elif (listed := getattr(value, "tolist", None)) is not None:
+        value = listed()
     if isinstance(value, bool) or value is None:
         return {True: "true", False: "false", None: "–"}[value]
     if isinstance(value, int | float):
@@ -119,5 +120,5 @@ def effect_text(name: str) -> SimpleNamespace:
         equation=of("equation"),
         signature=of("signature"),
         separated_by=separated_by if isinstance(separated_by, str) else "; ".join(map(str, separated_by)),
-        meanings={parameter.name: parameter.meaning for parameter in of("parameters")},
+        meanings={parameter.name: parameter.meaning for parameter in getattr(entry, "parameters", ())},
     )

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Write diagnosis.json (docs/diagnosis.schema.json) and report.html.
 
 Both texts are complete before the first file is written; each file is written to a temporary name and renamed.

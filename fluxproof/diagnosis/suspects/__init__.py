@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Causes that the simulation has no parameter for: they compete with the catalogue, are described and never named.
 
 Every module in this folder that defines EFFECT is an entry; its ``clause`` completes "as if ...".

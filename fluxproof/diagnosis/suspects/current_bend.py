@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Current sensors that are no longer linear towards full scale, as behind a core or an amplifier that saturates."""
 
 import numpy as np
@@ -37,9 +38,9 @@ class CurrentBend(Effect):
         return 0.4
 
     @staticmethod
-    def _phases(c):
+    def _phases(c) -> np.ndarray:
         """(3,) relative error of each phase at rated current."""
-        return sum(value * np.array(PHASES[key.partition("_")[2]]) for key, value in c.items())
+        return sum((value * np.array(PHASES[key.partition("_")[2]]) for key, value in c.items()), np.zeros(3))
 
     def size(self, c, nominal):
         return float(np.max(np.abs(self._phases(c))))

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A gain of all current sensors that drifts over the recording, as of a shunt or an amplifier that warms up."""
 
 import numpy as np

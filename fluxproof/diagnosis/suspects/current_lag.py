@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Measured currents that are late against angle and voltage, as behind a filter in front of the converters."""
 
 import numpy as np

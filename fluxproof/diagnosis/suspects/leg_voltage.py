@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Voltage errors of single inverter legs, constant over the turn, as of drivers with different delays."""
 
 import numpy as np

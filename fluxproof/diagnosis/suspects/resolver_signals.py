@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A resolver whose sine and cosine have different amplitudes or are not at right angles.
 
 With as many pole pairs as the machine it is wrong twice per electrical turn.  Of amplitudes that differ by the share a,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """An angle sensor that turns against the rotor with the torque, as behind a soft shaft or coupling."""
 
 import numpy as np

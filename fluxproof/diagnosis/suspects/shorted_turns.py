@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Turns of one phase that are shorted: their EMF drives a current in the short, which the terminals do not see."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A sine filter or a long cable: capacitors across the terminals, whose current is measured, behind a choke."""
 
 import numpy as np

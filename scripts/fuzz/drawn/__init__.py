@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Strategies of Hypothesis: damage to bytes, hostile text, and files that only their own library can write."""

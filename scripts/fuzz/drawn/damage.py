@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Damage to valid files: bytes changed, left out, repeated; corner values in place of numbers; two files joined."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """HDF5 files that h5py writes without a complaint: odd types and shapes, declared sizes, links, attributes, nesting."""
 
 from __future__ import annotations

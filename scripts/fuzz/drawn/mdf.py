@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """MDF files with conversions of every type whose texts, numbers and tables are hostile, and with odd samples."""
 
 from __future__ import annotations

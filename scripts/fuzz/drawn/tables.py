@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Parquet, NumPy and MATLAB files with odd types, names, lengths and declared sizes, written by their own libraries."""
 
 from __future__ import annotations

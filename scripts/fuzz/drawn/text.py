@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Hostile text: names, cells, tables, encodings."""
 
 from __future__ import annotations

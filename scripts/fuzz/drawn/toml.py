@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Drive files with other values, keys and sections: as TOML that is right, and as text that may be none."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What is fuzzed, one module each, with
 
 SECONDS      processor time that one case may take

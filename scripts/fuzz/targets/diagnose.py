@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The whole of `diagnose` on damaged recordings, to its report: a few cases a minute."""
 
 from __future__ import annotations

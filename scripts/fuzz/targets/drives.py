@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Drive files, as `registers` and `diagnose` read them."""
 
 from __future__ import annotations

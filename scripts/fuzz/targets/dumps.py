@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Telemetry: dumps, captures of the stream, register files; a dump is replayed in the golden model too."""
 
 from __future__ import annotations

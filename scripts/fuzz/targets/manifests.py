@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Manifests of `fleet`, as CSV and Parquet."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Text of other languages: `project`, and `registers --format c`, with odd file names, folders, parts and addresses.
 
 The case is JSON of the arguments; what the texts mean to their languages is for the tests of fluxproof/quote.py.

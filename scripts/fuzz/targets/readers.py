@@ -1,6 +1,9 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Recordings of every format: read whole, and with the columns of a drive."""
 
 from __future__ import annotations
+
+import contextlib
 
 import h5py
 import numpy as np
@@ -62,7 +65,5 @@ def warm(folder) -> None:
     for number, (suffix, content) in enumerate(corpus.recordings()):
         path = folder / f"valid{number}{suffix}"
         path.write_bytes(content)
-        try:
+        with contextlib.suppress(RecordingError):
             run(path)
-        except RecordingError:
-            pass

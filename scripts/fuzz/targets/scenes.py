@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Drive files, as `simulate` reads them: its scene and its margins, without the simulation itself."""
 
 from __future__ import annotations

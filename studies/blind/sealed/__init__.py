@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A drive simulation of its own at switching level, for the benchmark: it shares no code with the catalogue or plant.
 
 drives.py     random machines and inverters in per-unit, and their drive files

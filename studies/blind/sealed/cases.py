@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Random cases: stratum, drive, plan and faults, determined by (seed, number, stratum, turn, attempt)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Field-oriented control: current regulator with internal-model gains, speed regulator, modulation."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Random drives from 12 to 800 V, drawn in per-unit of their voltage, current and base speed, and their drive files."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the real drive does differently from its drive file: changes of (machine, inverter, sensors)."""
 
 from __future__ import annotations
@@ -165,13 +166,13 @@ def delay(a, d, rng, s):
 def current_offset(a, d, rng, s):
     x = _three(rng, 0.018 * s * d.current)
     a.set("sensors", offset=a.sensors.offset + x)
-    return {f"offset_{k}_a": float(v) for k, v in zip("abc", x)}
+    return {f"offset_{k}_a": float(v) for k, v in zip("abc", x, strict=True)}
 
 
 def current_gain(a, d, rng, s):
     x = _three(rng, 0.035 * s)
     a.set("sensors", gain=a.sensors.gain * (1.0 + x))
-    return {f"gain_{k}": float(v) for k, v in zip("abc", x)}
+    return {f"gain_{k}": float(v) for k, v in zip("abc", x, strict=True)}
 
 
 def current_scale(a, d, rng, s):

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Three legs between switching instants.
 
 The upper switch of a leg is commanded on around the middle of a carrier period.  A switch turns off at once, its

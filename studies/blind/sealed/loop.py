@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The closed loop, one control period after the other.
 
 In the period that begins at row k the duties of row k - 1 are in force.  Angle and bus belong to the beginning of

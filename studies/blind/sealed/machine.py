@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One substep of machine and shaft: second-order midpoint rule on the stationary flux linkage.
 
 d psi/dt = u - R i;  the iron's branch and a shorted coil are paths beside the winding that see d psi/dt.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Flux linkages of the rotor's axes from one co-energy, their inverse, and the torque that belongs to them.
 
 W'(i_d, i_q, theta) = self terms + cross term + magnet with harmonics + slotting;  psi = dW'/di,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The numbers of the real drive and its controller, as the compiled simulation takes them; SI units, peak values."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What a drive is asked to do: points on a test bench, a torque cycle, or a speed cycle of a free shaft."""
 
 from __future__ import annotations

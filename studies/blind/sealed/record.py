@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One recording: the healthy drive of a drive file, and the columns that the simulation gives."""
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ def simulate(rng, drive, real, plan, control):
         real.machine, real.inverter, real.sensors, control, plan.goal / drive.pole_pairs, plan.i_ref, plan.load,
         plan.fan, plan.free, float(rng.uniform(-np.pi, np.pi)), rng.standard_normal((n, 5)),
     )  # fmt: skip
-    return dict(zip(ROWS, rows.T)), dict(zip(INSIDE, inside.T))
+    return dict(zip(ROWS, rows.T, strict=True)), dict(zip(INSIDE, inside.T, strict=True))
 
 
 def recorded(rng, drive, columns, first, with_torque, with_temperature, with_references) -> dict:

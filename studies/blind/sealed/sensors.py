@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Current converters, encoder or resolver with tracking loop, bus sensor."""
 
 import math

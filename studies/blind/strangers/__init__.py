@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Recordings of simulators that other people wrote, for the benchmark: they share no code with the catalogue.
 
 drives.py    machines with published parameters, and how the drive file believes them

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Random cases of a stranger: stratum, drive, plan and faults, determined by (seed, number, stratum, turn)."""
 
 from __future__ import annotations

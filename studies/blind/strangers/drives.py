@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Machines of published drives: data sheets and the examples of the two simulators; peak values, SI units."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """What the real drive does differently from its drive file: plain physics, with sizes that a bench would notice."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A plant of gym-electric-motor's machine, inverter and load, and a textbook controller for it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """A plant of motulator's machine, inverter and shaft, and motulator's own controller."""
 
 from __future__ import annotations

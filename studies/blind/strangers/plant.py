@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The interface of a plant, and its integration over the voltages of a control period."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """One recording: plan, closed loop, columns."""
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ class Voltages:
             return
         for _ in range(2):
             times, legs = self.carrier(self.period / 2, duties)
-            self.queue += [[t, np.asarray(x, float)] for t, x in zip(times, legs) if t > 0.0]
+            self.queue += [[t, np.asarray(x, float)] for t, x in zip(times, legs, strict=False) if t > 0.0]
 
     def apply(self, plant, seconds):
         """Advance the plant by a time."""

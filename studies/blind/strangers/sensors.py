@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Converters, encoder and bus measurement, with their faults and resolutions."""
 
 from __future__ import annotations

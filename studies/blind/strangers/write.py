@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Write a case of a stranger, with its entry of the truth."""
 
 from __future__ import annotations

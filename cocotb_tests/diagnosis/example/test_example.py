@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """`fluxproof diagnose --example`: its own recording, every hidden difference named, its size beside the truth."""
 
 from __future__ import annotations
