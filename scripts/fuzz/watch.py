@@ -19,9 +19,9 @@ from golden_model.kernel import CACHE_DIR
 FORBIDDEN = (
     "os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.startfile", "os.symlink", "os.link", "os.chmod",
     "subprocess.Popen", "pickle.find_class", "marshal.loads", "socket.connect", "socket.bind", "socket.getaddrinfo",
-    "urllib.Request", "ctypes.dlopen", "webbrowser.open", "shutil.rmtree",
+    "urllib.Request", "ctypes.dlopen", "webbrowser.open",
 )  # fmt: skip
-CHANGES = ("os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.truncate")  # allowed in the case's own folder
+CHANGES = ("os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.truncate", "shutil.rmtree")  # allowed in the case's folder
 # Code that these compile is their own: classes from field names, compiled kernels.
 COMPILES = (
     "collections",
@@ -35,6 +35,7 @@ COMPILES = (
     "reprlib.py",
 )
 INSTALLED = tuple({str(Path(p).resolve()) for p in (*sysconfig.get_paths().values(), sys.prefix, sys.base_prefix)})
+OWN_LOADING = ("<frozen importlib", os.path.join("numba", "core", "caching.py"))
 SYSTEM = ("/proc/self/", "/proc/cpuinfo", "/proc/meminfo", "/sys/devices/system/", "/dev/null", "/dev/urandom", "/usr/")
 SYSTEM += ("/etc/mime.types", "/etc/localtime", "/etc/fonts", "/sys/fs/cgroup", "/proc/stat")
 
@@ -81,7 +82,7 @@ class Watch:
             return self._of_open(*args[:3])
         if event in CHANGES and not isinstance(args[0], int):
             return "" if self._own(args[0]) or _of_kernels(args[0]) else f"{event} {args[0]!r}"
-        return f"{event} {args!r}"[:300] if event in FORBIDDEN and not _importing() else ""
+        return f"{event} {args!r}"[:300] if event in FORBIDDEN and not _inside(OWN_LOADING) else ""
 
     def _of_code(self, code) -> str:
         """Text made code outside an import: its file name is no file."""
@@ -114,11 +115,11 @@ def _of_kernels(path) -> bool:
     return os.path.realpath(os.fsdecode(path)).startswith(str(CACHE_DIR.parent))
 
 
-def _importing() -> bool:
-    """Whether a module is being imported, whose own loading of code or libraries is no event of the input."""
+def _inside(files: tuple[str, ...]) -> bool:
+    """Whether code of one of these files is running: imports and compiled kernels load code that is no input."""
     frame = sys._getframe(3)
     while frame is not None:
-        if frame.f_code.co_filename.startswith("<frozen importlib"):
+        if any(part in frame.f_code.co_filename for part in files):
             return True
         frame = frame.f_back
     return False

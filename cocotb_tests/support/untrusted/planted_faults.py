@@ -15,6 +15,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from fluxproof.diagnosis.ground.recording import RecordingError
+from golden_model.drive_keys import DriveError
 from scripts.fuzz.case import Case
 
 SECONDS, TURN, NAMES_FILE = 1.5, 200, True
@@ -68,8 +69,8 @@ FAULTS = {
     "m": lambda path: kept.append(np.ones(60_000_000)),
     "c": lambda path: os.kill(os.getpid(), signal.SIGSEGV),
     "q": lambda path: os._exit(0),
-    "2": lambda path: _raise(RecordingError(f"{path}: two\nlines")),
-    "b": lambda path: _raise(RecordingError(f"{path}: \x1b[31m")),
+    "2": lambda path: _raise(DriveError(f"{path}: two\nlines")),
+    "b": lambda path: _raise(DriveError(f"{path}: \x1b[31m")),
     "t": lambda path: _raise(RecordingError(f"{path}: {'long ' * 300}")),
     "f": lambda path: _raise(RecordingError("no file is named")),
 }
