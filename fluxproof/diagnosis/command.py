@@ -159,10 +159,10 @@ def effect_table(effects) -> list[str]:
 
     rows = [("effect", "parameter", "value", "confidence", "explains")]
     for effect in effects:
-        first = (effect.name, percent(effect.confidence), explained(effect, effects))
+        name, sure, share = effect.name, percent(effect.confidence), explained(effect, effects)
         for key, e in effect.parameters.items():
-            rows.append((first[0], key, measured(e.value, e.sigma, e.unit), *first[1:]))
-            first = ("", "", "")
+            rows.append((name, key, measured(e.value, e.sigma, e.unit), sure, share))
+            name = sure = share = ""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
 

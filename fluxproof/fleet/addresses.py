@@ -12,14 +12,15 @@ import os
 import re
 import tempfile
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import IO
 
 import fsspec
 from fsspec.utils import infer_compression
 
 from fluxproof.diagnosis.ground.recording import RecordingError
-from fluxproof.diagnosis.readers.table import shown
+from fluxproof.quote import shown
 from golden_model.regular_file import open_regular
 
 HERE = frozenset({"file", "local"})
@@ -65,13 +66,19 @@ def protocol_of(part: str) -> str:
     return part.partition("://")[0] if "://" in part else ""
 
 
-def opened(recording: str):
+@contextlib.contextmanager
+def opened(recording: str) -> Iterator[IO[bytes]]:
     """A recording open for reading bytes; OSError if it is no regular file or cannot be read."""
     if not remote(recording):
-        return open_regular(recording)
+        with open_regular(recording) as file:
+            yield file
+        return
     with _as_os_error():
         _check_target(recording)
-        return fsspec.open(recording, "rb").open()  # pyright: ignore[reportAttributeAccessIssue]  # one name: OpenFile
+        source = fsspec.open(recording, "rb")
+        assert isinstance(source, fsspec.core.OpenFile)  # one name gives one file
+        with source as file:  # its end closes the archive too, which reading needs until then
+            yield file
 
 
 def stated(recording: str) -> dict:

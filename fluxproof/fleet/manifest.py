@@ -18,9 +18,9 @@ from pathlib import Path
 
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.readers import readers
-from fluxproof.diagnosis.readers.table import shown
 from fluxproof.fleet.addresses import check_address, matching, remote, spelled
 from fluxproof.fleet.manifest_file import is_manifest, table
+from fluxproof.quote import shown
 from golden_model.regular_file import open_regular
 
 KNOWN = ("recording", "drive", "serial", "time", "temperature")

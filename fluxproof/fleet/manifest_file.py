@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 
 from fluxproof.diagnosis.ground.limits import limited
 from fluxproof.diagnosis.ground.recording import RecordingError
-from fluxproof.diagnosis.readers.table import shown
+from fluxproof.quote import shown
 from golden_model.regular_file import open_regular
 
 RECORDING = "recording"  # the column that makes a table a manifest

@@ -21,7 +21,7 @@ FORBIDDEN = (
     "subprocess.Popen", "pickle.find_class", "marshal.loads", "socket.connect", "socket.bind", "socket.getaddrinfo",
     "urllib.Request", "ctypes.dlopen", "webbrowser.open",
 )  # fmt: skip
-CHANGES = ("os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.truncate", "shutil.rmtree")  # allowed in the case's folder
+CHANGES = ("os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.truncate", "shutil.rmtree")  # allowed in its folder
 # Code that these compile is their own: classes from field names, compiled kernels.
 COMPILES = (
     "collections",

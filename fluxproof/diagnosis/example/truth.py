@@ -22,7 +22,9 @@ class Compared(NamedTuple):
     @property
     def deviation(self) -> float:
         """Distance of the estimate from the truth in its standard deviations; infinite without an estimate."""
-        return float("inf") if self.value is None else abs(self.value - self.hidden.value) / self.sigma
+        if self.value is None or self.sigma is None:
+            return float("inf")
+        return abs(self.value - self.hidden.value) / self.sigma
 
 
 def compare(effects: Sequence[Mapping]) -> tuple[list[Compared], list[str]]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import difflib
 
 from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
-from fluxproof.diagnosis.readers.table import shown
+from fluxproof.quote import shown
 from golden_model.drive_keys import is_finite
 
 KEYS = {"name", "unit", "factor", "offset"}

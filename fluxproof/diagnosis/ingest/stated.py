@@ -16,7 +16,7 @@ import difflib
 
 from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
 from fluxproof.diagnosis.ingest.units import conversion, known_units
-from fluxproof.diagnosis.readers.table import shown
+from fluxproof.quote import shown
 from golden_model.drive_keys import RANGES, is_finite
 
 MEASURED = ("t", "u_a", "u_b", "u_c", "u_ab", "u_bc", "u_ca")  # a constant would state nothing

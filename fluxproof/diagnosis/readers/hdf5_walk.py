@@ -12,7 +12,7 @@ import os
 
 from fluxproof.diagnosis.ground.limits import most_cells
 from fluxproof.diagnosis.ground.recording import RecordingError
-from fluxproof.diagnosis.readers.table import shown
+from fluxproof.quote import shown
 
 MOST_OBJECTS = 20_000
 MOST_DEPTH = 32  # groups inside each other
