@@ -106,6 +106,7 @@ ecp5: setup ## route on ECP5 by stock tools, three seeds: the clock rate, some m
 
 lint: setup ## check the style of the Python (ruff), its types (pyright) and the style of the VHDL (vsg)
 	.venv/bin/ruff check .
+	.venv/bin/ruff format --check .
 	PYRIGHT_PYTHON_IGNORE_WARNINGS=1 .venv/bin/pyright
 	$(if $(wildcard vsg.yaml),.venv/bin/vsg -c vsg.yaml -f $$(find rtl tb -name '*.vhd' ! -name fluxproof_pkg.vhd | sort))
 

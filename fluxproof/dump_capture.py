@@ -33,9 +33,7 @@ REPLAY = {
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the subcommand."""
-    parser.add_argument(
-        "capture", metavar="capture.bin", help="32-bit words, little-endian, as stored by a DMA"
-    )
+    parser.add_argument("capture", metavar="capture.bin", help="32-bit words, little-endian, as stored by a DMA")
     parser.add_argument(
         "--drive", metavar="drive.toml", required=True, help="the drive that the core was configured for"
     )
@@ -45,9 +43,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--piece", type=int, metavar="N", help="which piece of a capture with a reset inside, from 1 on"
     )
-    parser.add_argument(
-        "-o", "--out", metavar="FILE", help="the dump (default: the capture's name with .fluxdump)"
-    )
+    parser.add_argument("-o", "--out", metavar="FILE", help="the dump (default: the capture's name with .fluxdump)")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -72,9 +72,7 @@ def c_lines(name: str, drive: Drive, result: RegisterSet) -> list[str]:
     rows = []
     for r in result.rows:
         unit = "" if r.unit == "1" else f" {r.unit}"
-        rows.append(
-            f"    {{0x{ADDRESSES[r.name]:03X}, {r.integer}}}, /* {r.name}: {r.represented:.7g}{unit} */"
-        )
+        rows.append(f"    {{0x{ADDRESSES[r.name]:03X}, {r.integer}}}, /* {r.name}: {r.represented:.7g}{unit} */")
     return [
         c_comment(f"{Path(name).name} by `fluxproof registers --format c`: write each value to its offset."),
         "#ifndef FLUXPROOF_SETTINGS_H",

@@ -147,9 +147,7 @@ def _adaline_steps(drive):
     rated = machine.pole_pairs * machine.rated_speed_rad_s
     most = 0.5 / rated / rated
     if control.psi_eta is not None and control.psi_eta >= most:
-        why = (
-            f"eq. (B.3), 2*eta*omega**2 < 1 at the rated {rated:g} rad/s; the estimate of psi_m would diverge"
-        )
+        why = f"eq. (B.3), 2*eta*omega**2 < 1 at the rated {rated:g} rad/s; the estimate of psi_m would diverge"
         _refuse("[control] psi_eta", control.psi_eta, f"below {most:.4g} s2/rad2: {why}")
     if not control.winding_temp_min_c < control.winding_temp_max_c:
         _refuse("[control] winding_temp_min_c", control.winding_temp_min_c, "below winding_temp_max_c")

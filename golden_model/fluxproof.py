@@ -328,9 +328,7 @@ def step_given(state, sample, regs, config, of_speed):
         state.of_speed, x.position_code, r.reverse, r.k_speed, r.k_filter, of_speed.position_restart,
         of_speed.speed_given, of_speed.omega_given, c.position_bits,
     )  # fmt: skip
-    u_dc, u_max, u_dc_at_rail = u_dc_conditioning.step(
-        x.adc_u_dc, r.u_dc_offset, r.u_dc_gain, r.k_u_max, c.adc_bits
-    )
+    u_dc, u_max, u_dc_at_rail = u_dc_conditioning.step(x.adc_u_dc, r.u_dc_offset, r.u_dc_gain, r.k_u_max, c.adc_bits)
     inverse, inverse_beta, u_dc_low = u_dc_processing.step(u_dc)
 
     i_alpha, i_beta = clarke.step(i_a, i_b, i_c)
@@ -416,10 +414,7 @@ def step_given(state, sample, regs, config, of_speed):
 
 
 OBSERVED = {
-    p.name: p
-    for module in (sample_latch, *MODULES)
-    for p in module.BLOCK.outputs
-    if p.name in Observed._fields
+    p.name: p for module in (sample_latch, *MODULES) for p in module.BLOCK.outputs if p.name in Observed._fields
 }
 OBSERVED |= {p.name: p for p in (D_D, D_Q)}
 OBSERVED["code_theta"] = Port("code_theta", Format(0, 0, 18), doc="position code, one mechanical turn")

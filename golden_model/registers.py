@@ -42,9 +42,7 @@ def registers(drive: Drive) -> RegisterSet:
     entries = {e.name: e for part in PARTS for e in part(drive)}
     rows = {name: _row(entries[name], port) for name, port in REGISTERS.items()}
     _keep_pulse_above_dead_time(rows, drive)
-    config = Config(
-        drive.sensors.adc_bits, drive.sensors.position_bits, drive.carrier_half, int(drive.core.estimators)
-    )
+    config = Config(drive.sensors.adc_bits, drive.sensors.position_bits, drive.carrier_half, int(drive.core.estimators))
     values = Registers(*(rows[name].integer for name in REGISTERS))
     return RegisterSet(values, config, tuple(rows.values()))
 

@@ -181,9 +181,7 @@ def flux_estimator(drive):
     if limit is None:
         limit = COMPENSATION_PART * drive.nominal_flux_wb
         keys = "[machine] magnet_flux_wb, inductance_q_h, rated_current_a"
-    yield Entry(
-        "delta_max", limit, "Wb", b.flux_wb, f"{keys}; {base_keys(drive, 'voltage_v', 'omega_me_rad_s')}"
-    )
+    yield Entry("delta_max", limit, "Wb", b.flux_wb, f"{keys}; {base_keys(drive, 'voltage_v', 'omega_me_rad_s')}")
     yield Entry("flux_mode", c.flux_mode, "1", 1.0, "[control] flux_mode")
 
 
@@ -214,9 +212,7 @@ def vsi_estimators(drive):
     yield Entry("v_thr", least, "V", b.voltage_v, f"[control] v_dead_threshold_v; {volts}")
     most = LOSS_MARGIN * leg_loss_v(drive) + LOSS_SPARE_V if c.v_dead_limit_v is None else c.v_dead_limit_v
     keys = (
-        "[inverter] dead_time_s, pwm_frequency_hz, dc_bus_v"
-        if c.v_dead_limit_v is None
-        else "[control] v_dead_limit_v"
+        "[inverter] dead_time_s, pwm_frequency_hz, dc_bus_v" if c.v_dead_limit_v is None else "[control] v_dead_limit_v"
     )
     yield Entry("v_comp_max", most, "V", b.voltage_v, f"{keys}; {volts}")
     least, keys = LEARN_OF_RATED * m.rated_current_a, "[machine] rated_current_a"
@@ -227,9 +223,7 @@ def vsi_estimators(drive):
     yield Entry("eta_psi", 2.0 * eta, "s2/rad2", 1.0 / omega_b / omega_b, f"{keys}; {speed}")
     least = c.psi_min_speed_rad_s
     least = PSI_FROM * m.rated_speed_rad_s if least is None else least
-    yield Entry(
-        "omega_psi_min", m.pole_pairs * least, "rad/s", omega_b, f"[control] psi_min_speed_rad_s; {speed}"
-    )
+    yield Entry("omega_psi_min", m.pole_pairs * least, "rad/s", omega_b, f"[control] psi_min_speed_rad_s; {speed}")
     keys = "[machine] resistance_ohm, resistance_temp_coeff_per_k"
     tcr = m.resistance_ohm * m.resistance_temp_coeff_per_k
     yield Entry("tcr", tcr, "ohm/K", b.voltage_v / b.current_a, f"{keys}; {volts}; {amperes}")

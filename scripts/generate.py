@@ -61,9 +61,7 @@ def table(name: str, fmt: Format, values: list[int]) -> list[str]:
     """A ROM as an array constant, eight entries per line."""
     kind = "signed" if fmt.signed else "unsigned"
     digits = -(-fmt.width // 4)
-    lines = [
-        f"  type {name.lower()}_t is array (0 to {len(values) - 1}) of {kind}({fmt.width - 1} downto 0);"
-    ]
+    lines = [f"  type {name.lower()}_t is array (0 to {len(values) - 1}) of {kind}({fmt.width - 1} downto 0);"]
     lines.append(f"  constant {name} : {name.lower()}_t := (  -- {fmt}")
     cells = [f'{fmt.width}x"{v & ((1 << fmt.width) - 1):0{digits}x}"' for v in values]
     for k in range(0, len(cells), 8):

@@ -38,9 +38,7 @@ entity telemetry_words is
   );
   port (
 """
-CODES = dict.fromkeys(("adc_a", "adc_b", "adc_c", "adc_u_dc"), "`ADC_BITS`") | {
-    "position_code": "`POSITION_BITS`"
-}
+CODES = dict.fromkeys(("adc_a", "adc_b", "adc_c", "adc_u_dc"), "`ADC_BITS`") | {"position_code": "`POSITION_BITS`"}
 DEPTH_BITS = 9  # the default of rtl/io/telemetry.vhd
 
 

@@ -44,9 +44,7 @@ def number(text: str, signed: bool) -> int:
 
 def test_vhdl_equals_python(tmp_path):
     rows = cases()
-    (tmp_path / "in.txt").write_text(
-        "".join(f"{d} {w} {b} {x & ((1 << b) - 1):0{b}b}\n" for d, w, b, x in rows)
-    )
+    (tmp_path / "in.txt").write_text("".join(f"{d} {w} {b} {x & ((1 << b) - 1):0{b}b}\n" for d, w, b, x in rows))
     common = ["--std=08", f"--workdir={tmp_path}"]
     for source in (RTL / "common" / "fixed_pkg.vhd", ROOT / "tb" / "fixed_tb.vhd"):
         subprocess.run(["ghdl", "-a", *common, str(source)], check=True, cwd=tmp_path)
@@ -106,9 +104,7 @@ def test_generated_package_is_fresh(monkeypatch, tmp_path, capsys):
     """The committed VHDL package matches the declarations of the blocks; a stale one is detected."""
     assert generate.PACKAGE.read_text() == generate.render(), "run `make generate` and commit the result"
     stale = tmp_path / "fluxproof_pkg.vhd"
-    stale.write_text(
-        generate.render().replace("CLARKE_LATENCY : positive := ", "CLARKE_LATENCY : positive := 1")
-    )
+    stale.write_text(generate.render().replace("CLARKE_LATENCY : positive := ", "CLARKE_LATENCY : positive := 1"))
     monkeypatch.setattr(generate, "PACKAGE", stale)
     monkeypatch.setattr("sys.argv", ["generate", "--check"])
     assert generate.main() == 1

@@ -44,9 +44,7 @@ def check_equal_at_every_period(summary, arrays):
     assert summary["periods_compared"] >= 2000 and summary["differences"] == 0
     # The scenario must have been as hard as it claims.
     assert np.count_nonzero(arrays["observed_sat_q"]) > 100, "the voltage was never at its limit"
-    assert np.count_nonzero(arrays["observed_speed_limited"]) > 100, (
-        "the speed regulator was never at its limit"
-    )
+    assert np.count_nonzero(arrays["observed_speed_limited"]) > 100, "the speed regulator was never at its limit"
     assert arrays["plant_omega_m"].max() > 70 and arrays["plant_omega_m"].min() < -30
     assert np.abs(arrays["plant_torque"]).max() > 4
 
@@ -93,9 +91,7 @@ def check_pwm_timing(arrays, register_set, leg: int):
 def test_smallest_converters(tmp_path):
     """12-bit currents and a 12-bit resolver: the lower end of the generics."""
     text = (
-        PAPER.read_text()
-        .replace("adc_bits = 16", "adc_bits = 12")
-        .replace("position_bits = 16", "position_bits = 12")
+        PAPER.read_text().replace("adc_bits = 16", "adc_bits = 12").replace("position_bits = 16", "position_bits = 12")
     )
     path = tmp_path / "coarse.toml"
     path.write_text(text)

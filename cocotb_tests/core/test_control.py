@@ -35,9 +35,7 @@ def sag(start: float, stop: float, low: float):
     return course
 
 
-def simulate_drive(
-    seconds, rpm, u_dc=None, load=None, omega_m=0.0, i_q=None, changes=None, mode=FREE, start=None
-):
+def simulate_drive(seconds, rpm, u_dc=None, load=None, omega_m=0.0, i_q=None, changes=None, mode=FREE, start=None):
     """Columns i_d, i_q, lambda_d, lambda_q, omega_m, torque, u_alpha, u_beta; rpm and others are f(t) arrays."""
     n = round(seconds / T_S)
     time = np.arange(n) * T_S
@@ -53,9 +51,7 @@ def simulate_drive(
     machine = Machine.from_mapping(vars(DRIVE.machine))
     params = plant_params(machine, mode=mode)
     sensors = sensor_params(
-        Sensors(
-            current_bits=16, current_full_scale_a=12.5, u_dc_bits=16, u_dc_full_scale_v=1000, position_bits=16
-        )
+        Sensors(current_bits=16, current_full_scale_a=12.5, u_dc_bits=16, u_dc_full_scale_v=1000, position_bits=16)
     )
     out = np.zeros((n, 8))
     registers_used = values.values._replace(**(changes or {}))
@@ -77,9 +73,7 @@ def test_speed_recovers_from_seconds_of_saturation(sign):
     after = speed[time > 3.5].max() - target
     _, plain = simulate_drive(1.5, lambda t: np.full_like(t, sign * target), omega_m=sign * stuck * RPM)
     unsaturated = (sign * plain[:, 4] / RPM).max() - target
-    assert after <= unsaturated + 0.02 * target, (
-        f"overshoot {after:.1f} rpm, without saturation {unsaturated:.1f} rpm"
-    )
+    assert after <= unsaturated + 0.02 * target, f"overshoot {after:.1f} rpm, without saturation {unsaturated:.1f} rpm"
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -28,11 +28,7 @@ from studies.faults.cores import GoldenCore, VerilatedClock
 
 HALF = 64
 DRIVE, SET = setup(HALF)
-MIDDLE = (
-    dict.fromkeys(INPUT_PORTS, 0)
-    | {f"adc_{x}": 32768 for x in "abc"}
-    | {"adc_u_dc": 40000, "speed_mode_in": 1}
-)
+MIDDLE = dict.fromkeys(INPUT_PORTS, 0) | {f"adc_{x}": 32768 for x in "abc"} | {"adc_u_dc": 40000, "speed_mode_in": 1}
 
 
 def column(rows, name):
@@ -158,9 +154,7 @@ def test_tour_in_ghdl():
     }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "name", ["current sensor lost", "strobe missing", "strobe too early", "bus collapses"]
-)
+@pytest.mark.parametrize("name", ["current sensor lost", "strobe missing", "strobe too early", "bus collapses"])
 def test_case_in_the_converted_rtl(name):
     reason = ghdl5_missing()
     if reason:
@@ -185,9 +179,7 @@ def test_unexpected_response_is_reported():
     ):
         problems = faults.row(dataclasses.replace(case, **changed), outcome)["problems"]
         assert any(word in line for line in problems), problems
-    assert any(
-        "differ" in line for line in faults.row(case, dataclasses.replace(outcome, differences=1))["problems"]
-    )
+    assert any("differ" in line for line in faults.row(case, dataclasses.replace(outcome, differences=1))["problems"])
 
 
 def test_every_case_is_in_the_docs():
@@ -208,12 +200,8 @@ def test_random_register_writes_keep_the_gates_safe():
     for storm in range(60):
         for _ in range(40):
             name, port = list(fluxproof.REGISTERS.items())[rng.integers(len(fluxproof.REGISTERS))]
-            core.set(
-                name, int(rng.choice([port.fmt.lo, port.fmt.hi, rng.integers(port.fmt.lo, port.fmt.hi + 1)]))
-            )
-            core.set_many(
-                {p.name: int(rng.integers(p.fmt.lo, p.fmt.hi + 1)) for p in ports} | {"sample_valid": 1}
-            )
+            core.set(name, int(rng.choice([port.fmt.lo, port.fmt.hi, rng.integers(port.fmt.lo, port.fmt.hi + 1)])))
+            core.set_many({p.name: int(rng.integers(p.fmt.lo, p.fmt.hi + 1)) for p in ports} | {"sample_valid": 1})
             words = gate_words(core.trace(int(rng.integers(1, 90)), SEEN))
             core.set("sample_valid", 0)
             words = np.append(words, gate_words(core.trace(int(rng.integers(1, 90)), SEEN)))

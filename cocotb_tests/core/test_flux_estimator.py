@@ -82,9 +82,7 @@ def test_steady_errors_of_the_earlier_schemes(rpm, mode):
     """Merged models end where eq. (18) says, the scheme of eq. (16) where eq. (19) says: not on the flux."""
     view = run(held_at(rpm, -1.0, 3.0, 1.0), wrong_by(1.3, flux_mode=mode), mode=IMPOSED_SPEED)
     end = window(0.9, 1.0)
-    actual, estimate = (
-        complex(*(flux[x][end].mean() for x in "dq")) for flux in (view.actual, view.estimate)
-    )
+    actual, estimate = (complex(*(flux[x][end].mean() for x in "dq")) for flux in (view.actual, view.estimate))
     m, omega = DRIVE.machine, rpm * RPM * DRIVE.machine.pole_pairs
     g_v, g_c = merge_gains(omega)
     current = complex(view.i_d[end].mean(), view.i_q[end].mean())
@@ -158,9 +156,7 @@ def test_lost_bus_reading_is_reported_and_survived():
 def test_saturated_current_converter_is_reported_and_survived():
     """A load beyond the converters' range for 0.3 s: flag, bounded, correct again when the current is back in range."""
     small = NOMINAL.values._replace(**{f"gain_{x}": round(65536 * 3.0 / 12.5) for x in "abc"})
-    sensors = Sensors(
-        current_bits=16, current_full_scale_a=3.0, u_dc_bits=16, u_dc_full_scale_v=1000, position_bits=16
-    )
+    sensors = Sensors(current_bits=16, current_full_scale_a=3.0, u_dc_bits=16, u_dc_full_scale_v=1000, position_bits=16)
     scene = scenario(DRIVE, 1.5, rpm={0.0: 600}, load={0.0: 1.0, 0.4: 3.6, 0.7: 1.0}, start_rpm=600)
     clear = np.zeros(len(scene), np.int64)
     clear[round(0.15 / T_S)] = 1  # the start on the fly exceeds 3 A as well

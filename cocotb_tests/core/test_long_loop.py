@@ -99,9 +99,7 @@ def test_every_register_at_its_limits():
         for _ in range(60):
             for port in ports:  # some values stay for long, so that integrators reach their ends
                 if rng.integers(8) == 0:
-                    inside = run % 2 and port.name.startswith(
-                        "adc"
-                    )  # a code at its very ends sets a flag and holds
+                    inside = run % 2 and port.name.startswith("adc")  # a code at its very ends sets a flag and holds
                     ends = (port.low + inside, port.high - inside, int(rng.integers(port.low, port.high + 1)))
                     row[port.name] = int(rng.choice(ends))
             core.apply_sample(**row)

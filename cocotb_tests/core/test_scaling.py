@@ -92,9 +92,7 @@ def test_position_steps_give_speed_and_angle_advance(path):
     v, config, _ = registers(drive)
     state, code = speed.State(), 0
     for code in range(0, 3000, 10):
-        state, (omega_me, *_) = speed.step(
-            state, code, v.reverse, v.k_speed, v.k_filter, 0, 0, 0, config.position_bits
-        )
+        state, (omega_me, *_) = speed.step(state, code, v.reverse, v.k_speed, v.k_filter, 0, 0, 0, config.position_bits)
     turns = 10 / 2**drive.sensors.position_bits
     omega = turns * 2 * math.pi * drive.machine.pole_pairs / drive.sample_time_s
     assert to_si("omega_me", omega_me, drive) == pytest.approx(omega, abs=2 * si_per_lsb("omega_me", drive))

@@ -103,9 +103,7 @@ def test_stream_to_replay(folder, tmp_path, capsys):
     assert (got.checked, got.samples, got.first_difference) == (True, 160, None)
     assert f"{len(PACKET)} signals" in notes[0]
 
-    assert (
-        main(["diagnose", str(tmp_path / "run.fluxdump"), "--drive", str(PAPER), "--out", str(tmp_path)]) == 0
-    )
+    assert main(["diagnose", str(tmp_path / "run.fluxdump"), "--drive", str(PAPER), "--out", str(tmp_path)]) == 0
     assert "controller: 160 samples equal to the golden model in every bit" in capsys.readouterr().out
 
     acting = 0
@@ -135,9 +133,7 @@ def change_header(folder, old: str, new: str):
     head = raw[12 : 12 + size].decode()
     assert head.count(old + ",") == 1
     head = head.replace(old + ",", new + ",").encode()
-    (folder / "flipped.fluxdump").write_bytes(
-        raw[:8] + len(head).to_bytes(4, "little") + head + raw[12 + size :]
-    )
+    (folder / "flipped.fluxdump").write_bytes(raw[:8] + len(head).to_bytes(4, "little") + head + raw[12 + size :])
 
 
 def replayed_packet(samples, values, config):
@@ -182,25 +178,19 @@ def test_capture_cut_at_any_byte(cut, golden, tmp_path):
         assert got.first_difference is None and "not recorded" in " ".join(notes)
 
 
-@pytest.mark.parametrize(
-    ("start", "whole"), [(1, True), (400, True), (499, True), (530, False), (1500, False)]
-)
+@pytest.mark.parametrize(("start", "whole"), [(1, True), (400, True), (499, True), (530, False), (1500, False)])
 def test_capture_started_before_or_during_the_run(start, whole, tmp_path, capsys):
     """Gates off since the reset: replayed completely. Begun in mid-run: only blocks without state, and reported."""
     scenario = everything(DRIVE)
     first = {f.name: getattr(scenario, f.name) for f in dataclasses.fields(scenario)}
     first = {name: v for name, v in first.items() if isinstance(v, np.ndarray)}
-    held = {
-        name: np.zeros(500, v.dtype) if name == "enable" else np.full(500, v[0]) for name, v in first.items()
-    }
+    held = {name: np.zeros(500, v.dtype) if name == "enable" else np.full(500, v[0]) for name, v in first.items()}
     longer = {name: np.concatenate((held[name], v)) for name, v in first.items()}
     samples, observed, _ = golden_capture(DRIVE, SET, dataclasses.replace(scenario, **longer))
     path = tmp_path / "capture.bin"
     path.write_bytes(raw(packed(samples, observed)[start:]))
     assert main(["dump", str(path), "--drive", str(PAPER)]) == 0
-    assert (
-        "begins with the gates off" if whole else "begins while the drive runs"
-    ) in capsys.readouterr().out
+    assert ("begins with the gates off" if whole else "begins while the drive runs") in capsys.readouterr().out
     got, notes = digital.replay(recording(tmp_path / "capture.fluxdump"))
     assert got.first_difference is None and got.checked == whole
     assert got.samples == (3000 - start if whole else 0)
@@ -219,9 +209,7 @@ def test_lost_packets_and_number_wrap(golden, tmp_path):
     (piece,) = parse(raw(words[kept])).pieces
     found = recording(write_piece(tmp_path / "b.fluxdump", piece, DRIVE, SET))
     got, _ = digital.replay(found)
-    assert (
-        found.meta["start"] == "reset" and got.checked and got.samples >= 90 and got.first_difference is None
-    )
+    assert found.meta["start"] == "reset" and got.checked and got.samples >= 90 and got.first_difference is None
 
 
 def test_decreasing_numbers_split_the_recording(golden, tmp_path, capsys):
@@ -254,9 +242,7 @@ def test_wrong_bit_is_refused_or_detected(word, golden, tmp_path):
         try:
             capture = parse(raw(changed), "c.bin")
         except RecordingError as error:
-            assert str(error).startswith(
-                f"c.bin: the packet at byte {20 * SIZE} is damaged: word {word} is 0x"
-            )
+            assert str(error).startswith(f"c.bin: the packet at byte {20 * SIZE} is damaged: word {word} is 0x")
             assert "\n" not in str(error)
             continue
         if word == 0:
@@ -273,9 +259,7 @@ def test_wrong_bit_is_refused_or_detected(word, golden, tmp_path):
         if found is None:  # an input that acts on nothing here
             assert fields & set(telemetry_words.INPUTS)
         else:
-            assert found["sample"] >= 20 and (
-                found["signal"] in fields or fields & set(telemetry_words.INPUTS)
-            )
+            assert found["sample"] >= 20 and (found["signal"] in fields or fields & set(telemetry_words.INPUTS))
 
 
 def test_files_that_are_no_capture_are_refused(golden, tmp_path, capsys):
@@ -334,9 +318,7 @@ def test_generated_files_are_fresh():
     """The word multiplexer too equals what Python declares."""
     for path, text in generate.outputs().items():
         assert path.read_text() == text, f"{path.name} is stale: run `make generate` and commit it"
-    default = re.search(
-        r"DEPTH_BITS +: positive range 5 to 16 +:= (\d+)", (RTL / "io/telemetry.vhd").read_text()
-    )
+    default = re.search(r"DEPTH_BITS +: positive range 5 to 16 +:= (\d+)", (RTL / "io/telemetry.vhd").read_text())
     assert int(default.group(1)) == generate_telemetry.DEPTH_BITS
 
 
@@ -357,9 +339,7 @@ def test_c_reader_of_the_documentation(golden, tmp_path):
     if shutil.which("gcc") is None:
         pytest.skip("gcc is not installed")
     (code,) = re.findall(r"```c\n(.*?)```", (ROOT / "docs" / "telemetry.md").read_text(), re.DOTALL)
-    table = "".join(
-        f"{{{f.word}, {f.lsb}, {f.width}, {int(f.signed)}}}, " for n, f in LAYOUT.items() if n in FIELDS
-    )
+    table = "".join(f"{{{f.word}, {f.lsb}, {f.width}, {int(f.signed)}}}, " for n, f in LAYOUT.items() if n in FIELDS)
     main_function = f"""
 #include <stdio.h>
 int main(void)
@@ -373,9 +353,7 @@ int main(void)
 }}
 """
     (tmp_path / "reader.c").write_text(code + main_function)
-    subprocess.run(
-        ["gcc", "-Wall", "-Wextra", "-Werror", "-o", "reader", "reader.c"], cwd=tmp_path, check=True
-    )
+    subprocess.run(["gcc", "-Wall", "-Wextra", "-Werror", "-o", "reader", "reader.c"], cwd=tmp_path, check=True)
     words, _, _ = golden
     done = subprocess.run([tmp_path / "reader"], input=raw(words[::100]), capture_output=True, check=True)
     (piece,) = parse(raw(words[::100])).pieces

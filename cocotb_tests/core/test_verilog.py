@@ -27,9 +27,7 @@ from golden_model.io.sample_checks import IGNORE
 OTHER = {"ADC_BITS": 12, "POSITION_BITS": 18, "CARRIER_HALF": 75}
 
 
-@pytest.mark.parametrize(
-    "generics", [GENERICS, OTHER], ids=["sixteen_bits", "other_widths"]
-)
+@pytest.mark.parametrize("generics", [GENERICS, OTHER], ids=["sixteen_bits", "other_widths"])
 @pytest.mark.slow
 def test_equals_vhdl_clock_by_clock(ghdl5, generics, tmp_path, capsys):
     seed = int(os.environ.get("FLUXPROOF_SEED", "1"))

@@ -115,6 +115,4 @@ def test_axi_top_equals_vhdl_clock_by_clock(ghdl5, tmp_path, capsys):  # noqa: F
     still = [name for j, name in enumerate(names) if len({row[j] for row in wanted} - {None}) < 2]
     assert not still, f"the stimulus never moves {still}"
     with capsys.disabled():
-        print(
-            f"\nseed {seed}: {CLOCKS} clocks x {len(names)} outputs are equal; {undefined} values undefined"
-        )
+        print(f"\nseed {seed}: {CLOCKS} clocks x {len(names)} outputs are equal; {undefined} values undefined")

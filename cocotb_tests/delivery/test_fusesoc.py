@@ -29,9 +29,7 @@ def fusesoc(folder: Path, target: str, *options: str, path: str = "") -> subproc
         *options,
     ]
     environment = {**os.environ, "PATH": f"{path}{os.environ['PATH']}"}
-    return subprocess.run(
-        [*command, fusesoc_core.vlnv()], cwd=folder, capture_output=True, text=True, env=environment
-    )
+    return subprocess.run([*command, fusesoc_core.vlnv()], cwd=folder, capture_output=True, text=True, env=environment)
 
 
 def test_core_file_lists_every_source():

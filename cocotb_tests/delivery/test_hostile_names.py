@@ -241,5 +241,5 @@ def test_a_key_of_many_parts_is_refused_at_once(tmp_path, capsys, text):
 def test_a_file_with_many_points_is_read(tmp_path):
     """Points in strings, comments and numbers are no parts of keys."""
     points = "." * 200 + "a.b" * 60
-    text = f"# {points}\na = '{points}' # {points}\nb = \"\"\"\n{points}\n\"\"\"\nc = [{'1.5, ' * 100}]\n"
+    text = f'# {points}\na = \'{points}\' # {points}\nb = """\n{points}\n"""\nc = [{"1.5, " * 100}]\n'
     assert read_tables(named(tmp_path, "drive.toml", text))["c"] == [1.5] * 100

@@ -51,9 +51,7 @@ def test_top_reports_unconnected_ports(tmp_path):
     shutil.copytree(RTL, tmp_path / "rtl")
     path = tmp_path / "rtl" / "fluxproof.vhd"
     text = path.read_text()
-    path.write_text(
-        text.replace("    enable          : in", "    live_time : in bit;\n    enable          : in", 1)
-    )
+    path.write_text(text.replace("    enable          : in", "    live_time : in bit;\n    enable          : in", 1))
     with pytest.raises(ValueError, match=r"nothing drives live_time of core \(fluxproof\)"):
         axi_top.render(tmp_path / "rtl")
     path.write_text(text.replace("    tripped         : out", "    gone : out", 1))
@@ -73,9 +71,7 @@ def test_top_is_vhdl_93(tmp_path, top):
     context = "library ieee;\nuse ieee.std_logic_1164.all;\nuse ieee.numeric_std.all;\nuse work.fluxproof_pkg.all;\n"
     text = context.rsplit("use", 1)[0] + "package fluxproof_pkg is\n" + "\n".join(shared) + "\nend fluxproof_pkg;\n"
     for name in top.instances.values():
-        entity = re.search(
-            r"^entity (\w+) is.*?^end entity", (RTL / name).read_text(), re.MULTILINE | re.DOTALL
-        )
+        entity = re.search(r"^entity (\w+) is.*?^end entity", (RTL / name).read_text(), re.MULTILINE | re.DOTALL)
         text += f"{context}{entity[0]};\narchitecture none of {entity[1]} is begin end none;\n"
     (tmp_path / "around.vhd").write_text(text)
     for path in ("around.vhd", str(top.path)):
@@ -122,10 +118,7 @@ def test_component_matches_the_vhdl(component):
 
 
 def test_interfaces_contain_each_bus_pin_once(component):
-    taken = [
-        e.text
-        for e in component.iterfind("s:busInterfaces/s:busInterface/s:portMaps//s:physicalPort/s:name", S)
-    ]
+    taken = [e.text for e in component.iterfind("s:busInterfaces/s:busInterface/s:portMaps//s:physicalPort/s:name", S)]
     assert len(taken) == len(set(taken))
     buses = {p for p in read_entity(axi_top.PATH).pins if re.match("s_axi_|m_axis_", p)}
     assert buses | {"aclk", "aresetn", "irq"} == set(taken)

@@ -28,8 +28,7 @@ def script(tmp_path):
     (environment / "site").mkdir()
     python = environment / "bin" / "python"
     python.write_text(
-        f'#!/bin/sh\ncase "$2" in *purelib*) echo "{environment}/site" ;;\n'
-        f'*) exec "{sys.executable}" "$@" ;; esac\n'
+        f'#!/bin/sh\ncase "$2" in *purelib*) echo "{environment}/site" ;;\n*) exec "{sys.executable}" "$@" ;; esac\n'
     )
     python.chmod(0o755)
     names = f'root="{ROOT}" venv="{environment}"; . "{ROOT}/scripts/setup/venv.sh"; add_commands "$venv"'

@@ -34,6 +34,7 @@ def test_vhdl_style():
 
 def test_python_style():
     run(["ruff", "check", "."])
+    run(["ruff", "format", "--check", "."])
 
 
 @pytest.mark.slow

@@ -46,9 +46,7 @@ def test_a_wrong_assignment_is_named(labels, groups, words):
 
 def test_instances_are_read_without_comments(tmp_path):
     file = tmp_path / "x.vhd"
-    file.write_text(
-        "  A_1 : entity work.one\n  -- b : entity work.two\n  c: entity WORK.three generic map (\n"
-    )
+    file.write_text("  A_1 : entity work.one\n  -- b : entity work.two\n  c: entity WORK.three generic map (\n")
     assert instances(file) == {"a_1": "one", "c": "three"}
 
 
@@ -132,9 +130,7 @@ def test_added_and_removed_rows():
 def test_update_keeps_the_rest_and_logs(tmp_path):
     path = tmp_path / "counts.json"
     kept.update({"xc7": {"a": ROW, "b": ROW}}, "first", "Yosys 1", path, "2026-01-01")
-    moved = kept.update(
-        {"xc7": {"a": {**ROW, "lut": 1029, "ff": 400}}}, " second ", "Yosys 2", path, "2026-01-02"
-    )
+    moved = kept.update({"xc7": {"a": {**ROW, "lut": 1029, "ff": 400}}}, " second ", "Yosys 2", path, "2026-01-02")
     now = kept.read(path)
     assert moved == ["xc7 a ff: 500 kept, 400 counted"]
     assert now["counts"] == {"xc7": {"a": {**ROW, "lut": 1029, "ff": 400}, "b": ROW}}

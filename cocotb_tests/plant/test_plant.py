@@ -61,9 +61,7 @@ MACHINE = Machine(
     inertia_kgm2=1.6e-3,
     viscous_friction_nms=7.48e-4,
 )
-SATURATED = replace(
-    MACHINE, saturation_d_per_a2=0.003, saturation_q_per_a2=0.006, cross_saturation_wb_per_a2=1.5e-4
-)
+SATURATED = replace(MACHINE, saturation_d_per_a2=0.003, saturation_q_per_a2=0.006, cross_saturation_wb_per_a2=1.5e-4)
 HARMONIC = replace(MACHINE, emf_harmonics=(Harmonic(6, 0.02, 0.03, 0.4), Harmonic(12, 0.005, -0.01, 1.0)))
 
 
@@ -110,9 +108,7 @@ def test_steady_state_with_held_voltage_is_the_sampled_closed_form():
     decay, turn = math.exp(-r / ell * PERIOD), np.exp(1j * w * PERIOD)
     emf = 1j * w * psi / ell * (turn - decay) / (1j * w + r / ell)
     expected = ((1.0 - decay) / r * u - emf) / (turn - decay)
-    plant = AveragedPlant(
-        machine, mode=IMPOSED_SPEED, omega_m=w_m, substeps=8, i_d=expected.real, i_q=expected.imag
-    )
+    plant = AveragedPlant(machine, mode=IMPOSED_SPEED, omega_m=w_m, substeps=8, i_d=expected.real, i_q=expected.imag)
     for _ in range(500):
         plant.advance(duties_for(plant.theta_m * machine.pole_pairs, u.real, u.imag), U_DC, w_m, PERIOD)
         # (w h)^5/120 with h = 12.5 us is 8e-13 of the flux (10 A equivalent) per step.
@@ -145,9 +141,7 @@ def test_open_circuit_voltage_is_the_change_of_magnet_flux(machine):
         psi = complex(machine.magnet_flux_wb)
         for h in machine.emf_harmonics:
             angle = h.order * theta + h.phase_rad
-            psi += machine.magnet_flux_wb * complex(
-                h.amplitude_d * math.cos(angle), h.amplitude_q * math.sin(angle)
-            )
+            psi += machine.magnet_flux_wb * complex(h.amplitude_d * math.cos(angle), h.amplitude_q * math.sin(angle))
         psi *= np.exp(1j * theta)
         assert plant.i_abc == pytest.approx(0.0, abs=1e-7)  # the model's own zero
         # 1e-7 A of leftover current is 2e-9 Wb.
@@ -312,8 +306,7 @@ def test_measured_flux_map_inverts_to_its_currents():
     with file.open(newline="") as lines:
         rows = list(csv.DictReader(lines))
     i_d, i_q, psi_d, psi_q, torque = (
-        np.array([float(row[name]) for row in rows])
-        for name in ("id_A", "iq_A", "psid_Vs", "psiq_Vs", "torque_Nm")
+        np.array([float(row[name]) for row in rows]) for name in ("id_A", "iq_A", "psid_Vs", "psiq_Vs", "torque_Nm")
     )
     measured = FluxMap.from_points(i_d, i_q, psi_d, psi_q)
     # The measurement folds around zero current: psi_d falls there while i_d rises.

@@ -107,9 +107,7 @@ def test_dead_time_takes_its_voltage():
     lost = BUS * ((2 * a - b - c) / 3.0 + 1j * (b - c) / np.sqrt(3.0))
     lost = lost - (trace["u_mean_alpha"] + 1j * trace["u_mean_beta"])[1:]
     legs = np.sign(np.stack([columns[k][1:] for k in ("i_a", "i_b", "i_c")]))
-    wanted = (
-        BUS * 2e-6 / T * ((2 * legs[0] - legs[1] - legs[2]) / 3.0 + 1j * (legs[1] - legs[2]) / np.sqrt(3.0))
-    )
+    wanted = BUS * 2e-6 / T * ((2 * legs[0] - legs[1] - legs[2]) / 3.0 + 1j * (legs[1] - legs[2]) / np.sqrt(3.0))
     clear = np.min(np.abs([columns[k][1:] for k in ("i_a", "i_b", "i_c")]), axis=0) > 0.4
     assert np.median(np.abs(lost - wanted)[clear]) < 0.02 * np.median(np.abs(wanted[clear]))
 
@@ -163,9 +161,7 @@ def _misfit_of(effect, size=0.5):
     m, period = n.machine, n.period_s
 
     def clarke(x):
-        return (2 * c[x + "a"] - c[x + "b"] - c[x + "c"]) / 3.0 + 1j * (c[x + "b"] - c[x + "c"]) / np.sqrt(
-            3.0
-        )
+        return (2 * c[x + "a"] - c[x + "b"] - c[x + "c"]) / 3.0 + 1j * (c[x + "b"] - c[x + "c"]) / np.sqrt(3.0)
 
     i, turn = clarke("i_"), np.exp(1j * c["theta_e"])
     z = i / turn
@@ -263,9 +259,9 @@ def test_damage_changes_the_columns():
             columns[k] = columns[k] * nominal.machine["rated_current_a"]
         before = {k: v.copy() for k, v in columns.items()}
         assert spoil(columns, rng, nominal), name
-        assert any(
-            len(columns[k]) != len(before[k]) or not np.array_equal(columns[k], before[k]) for k in columns
-        ), name
+        assert any(len(columns[k]) != len(before[k]) or not np.array_equal(columns[k], before[k]) for k in columns), (
+            name
+        )
 
 
 def test_request_is_limited_to_the_drive():

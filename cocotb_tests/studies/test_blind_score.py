@@ -29,9 +29,7 @@ def _truth(stratum="single", names=("resistance",), identifiable=True, form="cat
     }
 
 
-def _answer(
-    verdict="explained", names=("resistance",), ambiguity=(), value=2.0, sigma=0.01, ratio=1.0, problems=()
-):
+def _answer(verdict="explained", names=("resistance",), ambiguity=(), value=2.0, sigma=0.01, ratio=1.0, problems=()):
     effects = [
         {
             "name": n,

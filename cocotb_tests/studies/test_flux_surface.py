@@ -23,20 +23,14 @@ SPREAD = np.arange(-120.0, 121.0, 30.0)
 def saturating(i, cross=1.0):
     """A reciprocal flux [Wb] outside the catalogue's formulas: derivatives of sums of log cosh."""
     x, y = i.real + 40.0, i.imag
-    mixed = (
-        cross * 0.008 * np.exp(-((x / 90.0) ** 2) - (y / 70.0) ** 2)
-    )  # mixed co-energy of 0.36 J
+    mixed = cross * 0.008 * np.exp(-((x / 90.0) ** 2) - (y / 70.0) ** 2)  # mixed co-energy of 0.36 J
     psi_d = 0.0426 + 0.03 * (np.tanh(x / 110.0) - np.tanh(40.0 / 110.0)) - mixed * 2.0 * x / 90.0**2 * 50.0
     return psi_d + 1j * (0.085 * np.tanh(y / 90.0) - mixed * 2.0 * y / 70.0**2 * 50.0)
 
 
 def straight(i):
     """The nominal machine's flux with both inductances wrong."""
-    return (
-        MACHINE.magnet_flux_wb
-        + 1.2 * MACHINE.inductance_d_h * i.real
-        + 0.8j * MACHINE.inductance_q_h * i.imag
-    )
+    return MACHINE.magnet_flux_wb + 1.2 * MACHINE.inductance_d_h * i.real + 0.8j * MACHINE.inductance_q_h * i.imag
 
 
 def record(flux, omega, levels=SPREAD, seed=0, delta_r=0.0, noise_a=0.02):
@@ -65,9 +59,7 @@ def record(flux, omega, levels=SPREAD, seed=0, delta_r=0.0, noise_a=0.02):
 
 
 def view(flux, **more):
-    return joined_views(
-        [view_of(record(flux, w, seed=k, **more), NOMINAL) for k, w in enumerate((500.0, -900.0))]
-    )
+    return joined_views([view_of(record(flux, w, seed=k, **more), NOMINAL) for k, w in enumerate((500.0, -900.0))])
 
 
 @pytest.fixture(scope="module")
@@ -112,9 +104,7 @@ def test_a_hole_in_the_recording_stays_a_hole():
     hole = (np.abs(recording["i_d"]) < 50) & (np.abs(recording["i_q"]) < 50)
     recording.usable[hole] = False
     surface = flux_map(view_of(recording, NOMINAL))
-    assert (
-        not surface.covered(np.array([0.0, 15 + 15j])).any() and surface.covered(np.array([90.0 + 90j])).all()
-    )
+    assert not surface.covered(np.array([0.0, 15 + 15j])).any() and surface.covered(np.array([90.0 + 90j])).all()
 
 
 def test_resistance_fitted_with_the_surface(found):

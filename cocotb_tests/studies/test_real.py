@@ -39,9 +39,7 @@ def laas_entry(tmp_path_factory):
     return run(laas, tmp_path_factory.mktemp("laas"))
 
 
-@pytest.mark.parametrize(
-    "split", ("operating_points", "operating_points_loaded", "later_time", "later_time_loaded")
-)
+@pytest.mark.parametrize("split", ("operating_points", "operating_points_loaded", "later_time", "later_time_loaded"))
 def test_emrax_improves_on_both_axes(emrax_entry, split):
     for axis in "dq":
         both = emrax_entry["held_out_splits"][split][axis]
@@ -74,9 +72,7 @@ def test_laas_identified_parameters(laas_entry):
 def test_laas_unidentifiable_parameters(laas_entry):
     assert not {"dead_time", "current_offset", "inductance_q", "encoder_offset"} & set(laas_entry["effects"])
     text = " ".join(laas_entry["cannot_tell"])
-    assert all(
-        word in text for word in ("d axis", "L_q", "Inverter loss", "Offset", "Vsupply", "torque constant")
-    )
+    assert all(word in text for word in ("d axis", "L_q", "Inverter loss", "Offset", "Vsupply", "torque constant"))
 
 
 @pytest.mark.study
@@ -95,6 +91,4 @@ def test_absent_recordings_are_reported_without_failure(tmp_path, monkeypatch, c
     monkeypatch.setenv("FLUXPROOF_RECORDINGS", str(tmp_path / "none"))
     assert main(["--out", str(tmp_path), "--quiet"]) == 0
     result = json.loads((tmp_path / "result.json").read_text())
-    assert (
-        all("skipped" in entry for entry in result["recordings"].values()) and len(result["recordings"]) == 3
-    )
+    assert all("skipped" in entry for entry in result["recordings"].values()) and len(result["recordings"]) == 3

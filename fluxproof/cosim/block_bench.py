@@ -85,9 +85,7 @@ async def equals_model(dut):
     following = [row.number for row in bench.rows[1:]] + [bench.clocks]
     for row, following_number in zip(bench.rows, following, strict=True):
         wrong = [
-            (name, value, wanted)
-            for name, wanted in row.strobes
-            if (value := read(announced[name], False)) != wanted
+            (name, value, wanted) for name, wanted in row.strobes if (value := read(announced[name], False)) != wanted
         ]
         if not wrong and (row.outputs or bench.atomic):
             seen = {name: read(handle, signed) for name, handle, signed in outputs}

@@ -46,14 +46,10 @@ class Scenario:
     speed_mode: np.ndarray  # 0 or 1
     enable: np.ndarray  # 0 or 1
     brake: np.ndarray | None = None  # [Nm] largest torque of a brake on the shaft, see ``load_torque``
-    changes: Mapping[int, Mapping[str, int]] = field(
-        default_factory=dict
-    )  # period -> registers from there on
+    changes: Mapping[int, Mapping[str, int]] = field(default_factory=dict)  # period -> registers from there on
     omega_m: float = 0.0  # mechanical speed at the start [rad/s]
     clear_faults: np.ndarray | None = None  # 0 or 1; None: never
-    temp_winding: np.ndarray | None = (
-        None  # winding temperature [degC]; NaN: reading lost; None: no sensor
-    )
+    temp_winding: np.ndarray | None = None  # winding temperature [degC]; NaN: reading lost; None: no sensor
 
     def __len__(self) -> int:
         return len(self.load)

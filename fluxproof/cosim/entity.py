@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 _ENTITY = re.compile(r"^entity\s+(\w+)\s+is\b(.*?)^end\s+entity", re.IGNORECASE | re.DOTALL | re.MULTILINE)
-_GENERIC = re.compile(
-    r"^\s*(\w+)\s*:\s*(\w+)(?:\s+range\s+(\w+)\s+to\s+(\w+))?\s*:=\s*(\w+)\s*;?\s*(?:--\s*(.*))?$"
-)
+_GENERIC = re.compile(r"^\s*(\w+)\s*:\s*(\w+)(?:\s+range\s+(\w+)\s+to\s+(\w+))?\s*:=\s*(\w+)\s*;?\s*(?:--\s*(.*))?$")
 _PORT = re.compile(
     r"^\s*(\w+)\s*:\s*(in|out|inout)\s+(\w+)(?:\((.+?)\s+downto\s+(\w+)\))?\s*;?\s*(?:--\s*(.*))?$",
     re.IGNORECASE,
@@ -87,9 +85,7 @@ def parse_entity(text: str, file: str) -> Entity:
             continue
         elif part == "generic" and (hit := _GENERIC.match(line)):
             key, kind, low, high, default, doc = hit.groups()
-            generics[key] = Generic(
-                key, kind.lower(), int(default), _number(low), _number(high), (doc or "").strip()
-            )
+            generics[key] = Generic(key, kind.lower(), int(default), _number(low), _number(high), (doc or "").strip())
         elif part == "port" and (hit := _PORT.match(line)):
             key, mode, kind, left, right, doc = hit.groups()
             if right not in (None, "0"):

@@ -47,7 +47,7 @@ from golden_model.drive_keys import DriveError
 
 IMPROVED, ANSWER = "drive_improved.toml", "diagnosis.json"
 FLUX_MAP_NOTE = (
-    'flux_map.csv contains the flux linkage over the recorded currents; '
+    "flux_map.csv contains the flux linkage over the recorded currents; "
     'use it by [plant.machine] flux_map = "flux_map.csv".'
 )
 OVERLAY_SIGNALS = ("u_d_ref", "u_q_ref")  # not the currents: the controller regulates them to their references

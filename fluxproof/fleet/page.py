@@ -82,9 +82,7 @@ def design_view(n: int, design: Design) -> dict:
         "outliers": [outlier_view(serial, fs, design) for serial, fs in design.outliers.items()],
         "drifts": [drift_view(d) for d in design.drifts],
         "drift_pictures": [pictures.drift(d, f"d{n}_{k}") for k, d in enumerate(design.drifts[:MOST_PICTURES])],
-        "groups": [
-            {"group": g, "picture": pictures.signature(g, f"g{n}_{k}")} for k, g in enumerate(design.groups)
-        ],
+        "groups": [{"group": g, "picture": pictures.signature(g, f"g{n}_{k}")} for k, g in enumerate(design.groups)],
         "rows": recordings(design),
         "all": len(design.rows) <= MOST_ROWS,
     }

@@ -73,9 +73,7 @@ class FluxMap:
         Least squares under the condition that every step rises by at least
         floor x the median step.  Lines that fulfil the condition are unchanged.
         """
-        return FluxMap(
-            self.i_d_a, self.i_q_a, _rising(self.psi_d_wb.T, floor).T, _rising(self.psi_q_wb, floor)
-        )
+        return FluxMap(self.i_d_a, self.i_q_a, _rising(self.psi_d_wb.T, floor).T, _rising(self.psi_q_wb, floor))
 
     def axes(self):
         """Return [i_d start, i_d step, i_q start, i_q step] in A, float64 (4,)."""

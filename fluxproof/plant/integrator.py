@@ -69,9 +69,7 @@ def observe(m, psi_m, l_alpha, l_beta, omega, theta, guess_d, guess_q):
 @njit
 def _slope(m, mech, c, l_alpha, l_beta, omega, theta, guess_d, guess_q):
     """Derivatives (psi_alpha, psi_beta, omega), terminal currents and powers."""
-    i_alpha, i_beta, _, _, torque, _, _, _, _ = observe(
-        m, c.psi_m, l_alpha, l_beta, omega, theta, guess_d, guess_q
-    )
+    i_alpha, i_beta, _, _, torque, _, _, _, _ = observe(m, c.psi_m, l_alpha, l_beta, omega, theta, guess_d, guess_q)
     u_alpha = c.u_alpha - c.s_aa * i_alpha - c.s_ab * i_beta
     u_beta = c.u_beta - c.s_ab * i_alpha - c.s_bb * i_beta
     drop_alpha = c.r_aa * i_alpha + c.r_ab * i_beta

@@ -39,9 +39,7 @@ def sources(state, params, legs_v, legs_r, torque, load, acceleration):
     free, friction = 0.0, 0.0
     if mech.mode == FREE:
         free, friction = shaft_drive(mech, state[L.OMEGA_M], torque, load)
-    return Drive(
-        psi_m, u_alpha, u_beta, r_aa, r_ab, r_bb, s_aa, s_ab, s_bb, free, friction, load, acceleration
-    )
+    return Drive(psi_m, u_alpha, u_beta, r_aa, r_ab, r_bb, s_aa, s_ab, s_bb, free, friction, load, acceleration)
 
 
 @njit
@@ -64,9 +62,7 @@ def try_step(state, params, drive, step_s):
 @njit
 def accept(state, drive, step, step_s, period_s):
     """Write a Step into the state and add its contribution to the means of the period."""
-    omega, theta = stop_at_zero(
-        drive.friction, state[L.OMEGA_M], state[L.THETA_M], step.omega, step.theta, step_s
-    )
+    omega, theta = stop_at_zero(drive.friction, state[L.OMEGA_M], state[L.THETA_M], step.omega, step.theta, step_s)
     state[L.LAMBDA_ALPHA] = step.lambda_alpha
     state[L.LAMBDA_BETA] = step.lambda_beta
     state[L.OMEGA_M] = omega

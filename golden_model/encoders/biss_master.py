@@ -185,7 +185,7 @@ def stimuli(rng, config, patient=False):
         regs = {"half_period": half, "word_bits": word, "turn_bits": turn, "crc_on": crc_on, "start_max": 12 * period}
         length = 2 + word + 2 + CRC_BITS
         wrongs = (None, None, "error", "warning", "high", "low", "late", *range(0, length, 7 if word > 20 else 1))
-        for wrong in ((None, "error", int(rng.integers(length))) if patient else wrongs):
+        for wrong in (None, "error", int(rng.integers(length))) if patient else wrongs:
             data = [int(b) for b in rng.integers(2, size=word)] + [int(wrong != "error"), int(wrong != "warning")]
             bits = [1, 0, *data, *crc_of(data)]
             if isinstance(wrong, int):

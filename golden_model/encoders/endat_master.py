@@ -207,7 +207,7 @@ def stimuli(rng, config, patient=False):
         regs |= {"word_bits": word, "turn_bits": turn, "crc_on": crc_on, "start_max": 12 * period}
         length = 2 + two + word + CRC_BITS
         wrongs = (None, None, "error", "high", "low", "late", *range(0, length, 7 if word > 20 else 1))
-        for wrong in ((None, "error", int(rng.integers(length))) if patient else wrongs):
+        for wrong in (None, "error", int(rng.integers(length))) if patient else wrongs:
             errors = [int(wrong == "error"), 1][: 1 + two]
             data = [*errors, *(int(b) for b in rng.integers(2, size=word))]
             bits = [1, *data, *crc_of(data)]

@@ -105,9 +105,7 @@ _PORTS = {
     for module in (edge_timer, hall_decoder, input_filter)
     for p in module.BLOCK.inputs + module.BLOCK.registers + module.BLOCK.outputs
 }
-REGISTERS = tuple(
-    _PORTS[n] for n in ("filter_clocks", "hall_reverse", "hall_offset", "start_first", "sector_counts")
-)
+REGISTERS = tuple(_PORTS[n] for n in ("filter_clocks", "hall_reverse", "hall_offset", "start_first", "sector_counts"))
 
 BLOCK = Block(
     name="hall_front",

@@ -175,8 +175,17 @@ BLOCK = Block(
     registers=tuple(
         _PORTS[n]
         for n in (
-            "filter_clocks", "index_phase", "counts", "code_step", "code_rest", "correct_max", "k_edge", "hall_reverse",
-            "hall_offset", "start_first", "sector_counts",
+            "filter_clocks",
+            "index_phase",
+            "counts",
+            "code_step",
+            "code_rest",
+            "correct_max",
+            "k_edge",
+            "hall_reverse",
+            "hall_offset",
+            "start_first",
+            "sector_counts",
         )
     )
     + serial_encoder.REGISTERS,

@@ -50,9 +50,7 @@ def step(i_alpha, i_beta, omega_me, k_ahead, k_sign):
     x, _ = multiply_subtract(turn, i_beta, i_alpha, DROP_TURN, PU_W)
     y, _ = multiply_add(turn, i_alpha, i_beta, DROP_TURN, PU_W)
     across = round_half_up(y * K_SQRT3, DROP_SQRT3)
-    return clarke.step(
-        direction(2 * x, k_sign), direction(across - x, k_sign), direction(-across - x, k_sign)
-    )
+    return clarke.step(direction(2 * x, k_sign), direction(across - x, k_sign), direction(-across - x, k_sign))
 
 
 def twice_currents(v):

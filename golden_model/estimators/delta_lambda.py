@@ -56,9 +56,7 @@ def axis(u_int, i, factor, n, r):
 
 
 @kernel
-def step(
-    state, u_int_d, u_int_q, i_d, i_q, sat_d, sat_q, current_at_rail, voltage_known, run, factor, n_omega, r
-):
+def step(state, u_int_d, u_int_q, i_d, i_q, sat_d, sat_q, current_at_rail, voltage_known, run, factor, n_omega, r):
     delta_d, limited_d = axis(state.u_int_q_2, i_q, factor, n_omega, r)
     delta_q, limited_q = axis(state.u_int_d_2, i_d, -factor, n_omega, r)
     limited = limited_d | limited_q
@@ -110,10 +108,7 @@ def stimuli(rng, _config):
                 near = [max(min(x, INTEGRAL.hi), INTEGRAL.lo) for x in (end + off, end - off)]
                 rows.append({**still, "u_int_d": near[0], "u_int_q": near[1], "n_omega": n})
     for factor in (65536, -65536):
-        rows += [
-            {**still, "u_int_d": 32 * k, "u_int_q": -32 * k, "factor": factor, "n_omega": 0}
-            for k in range(-5, 6)
-        ]
+        rows += [{**still, "u_int_d": 32 * k, "u_int_q": -32 * k, "factor": factor, "n_omega": 0} for k in range(-5, 6)]
     return rows
 
 

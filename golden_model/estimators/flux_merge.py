@@ -142,13 +142,9 @@ def stimuli(rng, _config):
         {"t_s": SAMPLE_TIME.hi},
     ):
         for _ in range(25):
-            signals = {
-                k: int(rng.integers(-(1 << 22), 1 << 22)) for k in ("lambda_c_alpha", "u_applied_alpha")
-            }
+            signals = {k: int(rng.integers(-(1 << 22), 1 << 22)) for k in ("lambda_c_alpha", "u_applied_alpha")}
             signals |= {"lambda_c_beta": int(rng.integers(-9, 9)), "u_applied_beta": int(rng.integers(-9, 9))}
-            rows.append(
-                {**nominal, **change, **signals, "i_alpha": int(rng.integers(-9999, 9999)), "i_beta": 0}
-            )
+            rows.append({**nominal, **change, **signals, "i_alpha": int(rng.integers(-9999, 9999)), "i_beta": 0})
     for end in (FLUX.hi, FLUX.lo):
         pushed = {f"{k}_{of}": end for k in ("lambda_c", "u_applied") for of in ("alpha", "beta")}
         rows += [{**nominal, **pushed, "omega_0": OMEGA_0.hi, "i_alpha": 0, "i_beta": 0} for _ in range(40)]

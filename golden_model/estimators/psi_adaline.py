@@ -103,9 +103,7 @@ def stimuli(rng, _config):
     for omega in (49152, -49152, 131071, -131072):
         for _ in range(20):
             u_q = omega * 27000 // 65536 + int(rng.integers(-50, 50))
-            rows.append(
-                {**calm, "omega_chord": omega, "u_q": max(min(u_q, PU.hi), PU.lo), "i_d": -3000, "i_q": 9000}
-            )
+            rows.append({**calm, "omega_chord": omega, "u_q": max(min(u_q, PU.hi), PU.lo), "i_d": -3000, "i_q": 9000})
     rows = [{**row, "v_leg": 5000, "d_q": 80000, "eta_psi": 40000, "omega_psi_min": 3000} for row in rows]
     for change in ({"sat_d": 1}, {"sat_q": -1}, {"current_at_rail": 1}, {"voltage_known": 0}, {"run": 0}):
         rows.append({**rows[0], **change})

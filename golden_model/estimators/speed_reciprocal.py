@@ -56,9 +56,7 @@ def stimuli(_rng, _config):
     rows = []
     for omega_min, k_ramp in ((417, 157 * 16), (16, 4095 * 16), (0, 1), (131071, 65535)):
         for omega in (0, 1, 15, 16, 17, 32, 33, 416, 417, 418, 600, 833, 834, 835, 40000, PU.hi, PU.hi + 1):
-            rows += [
-                {"omega_me": s, "omega_min": omega_min, "k_ramp": k_ramp} for s in (-omega, min(omega, PU.hi))
-            ]
+            rows += [{"omega_me": s, "omega_min": omega_min, "k_ramp": k_ramp} for s in (-omega, min(omega, PU.hi))]
     return rows
 
 

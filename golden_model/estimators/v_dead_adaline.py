@@ -150,12 +150,7 @@ def bound(v, _state):
     e = h + 0.5 * h + 2 * V_FINE.lsb + FLUX.lsb
     pull = 2 * e + 2.1 * h + STEP.lsb
     v_dead = v["eta_v"] * pull + V_STATE.lsb + V_LEG.lsb
-    v_comp = (
-        (v["gamma"] + v["zeta"]) * (v_dead + V_FINE.lsb)
-        + v["zeta"] * v["v_thr"]
-        + 4 * V_STATE.lsb
-        + V_LEG.lsb
-    )
+    v_comp = (v["gamma"] + v["zeta"]) * (v_dead + V_FINE.lsb) + v["zeta"] * v["v_thr"] + 4 * V_STATE.lsb + V_LEG.lsb
     return {"v_dead": v_dead, "v_comp": v_comp, "v_leg": v_dead + v_comp}
 
 

@@ -60,9 +60,7 @@ def stimuli(_rng, _config):
     ):
         for valid in (1, 0):
             for r_s, tcr in ((641729, 2562610), (0, TCR.hi), (RESISTANCE.hi, TCR.hi)):
-                rows.append(
-                    {**ends, "temp_winding": temperature, "temp_valid": valid, "r_s": r_s, "tcr": tcr}
-                )
+                rows.append({**ends, "temp_winding": temperature, "temp_valid": valid, "r_s": r_s, "tcr": tcr})
     return rows
 
 

@@ -96,8 +96,7 @@ BLOCK = Block(
     latency=1,
     clocked=True,
     configs=({"ADC_BITS": 16, "POSITION_BITS": 16}, {"ADC_BITS": 12, "POSITION_BITS": 18}),
-    width_from={f"adc_{x}": code_format for x in CODES}
-    | {"encoder_code": turn_format, "position_code": turn_format},
+    width_from={f"adc_{x}": code_format for x in CODES} | {"encoder_code": turn_format, "position_code": turn_format},
     reference=None,
     bound=None,
     stimuli=stimuli,

@@ -62,9 +62,7 @@ def stimuli(_rng, config):
     for gain in (65536, -65536, 131071, -131072, 1):
         for code in (0, 1, top // 2, top // 2 + 1, top - 1, top):
             row = {f"code_{x}": code for x in "abc"}
-            row |= {f"offset_{x}": 32768 + k for k, x in enumerate("abc")} | {
-                f"gain_{x}": gain for x in "abc"
-            }
+            row |= {f"offset_{x}": 32768 + k for k, x in enumerate("abc")} | {f"gain_{x}": gain for x in "abc"}
             rows += [row, row | {"two_sensors": 1}]
     return rows
 
@@ -79,9 +77,7 @@ BLOCK = Block(
     paper="001, section 5.2, I/O conditioning",
     step=step,
     inputs=tuple(Port(f"code_{x}", CODE, doc=f"ADC code, phase {x}") for x in "abc"),
-    registers=tuple(
-        Port(f"offset_{x}", CODE, doc=f"code at zero current, phase {x}, left-aligned") for x in "abc"
-    )
+    registers=tuple(Port(f"offset_{x}", CODE, doc=f"code at zero current, phase {x}, left-aligned") for x in "abc")
     + tuple(Port(f"gain_{x}", GAIN, doc=f"current per code, phase {x}") for x in "abc")
     + (Port("two_sensors", BIT, doc="1: phase a has no sensor, its current is minus the sum of the others"),),
     outputs=tuple(Port(f"i_{x}", PU, doc=f"current, phase {x}") for x in "abc")

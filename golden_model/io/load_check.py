@@ -67,9 +67,7 @@ def stimuli(_rng, _config):
     rows += [usual | half | {"theta_me": k % 2 << (TURN_W - 2)} for k in range(20)]
     for stop in ({"run": 0}, {"i_q_ref": (20 << 8) - 1}, {"i_q_ref": -(20 << 8) - 1}, {"i_q_ref": -(20 << 8)}):
         for at in range(9):
-            rows += [
-                usual | half | {"theta_me": k % 4 << (TURN_W - 2)} | (stop if k == at else {}) for k in range(9)
-            ]
+            rows += [usual | half | {"theta_me": k % 4 << (TURN_W - 2)} | (stop if k == at else {}) for k in range(9)]
     for motion in range(8):
         rows += [usual | {"motion_faults": motion}, usual | half | {"motion_faults": motion}, usual]
         rows += [usual | {"motion_faults": motion, "run": 0}]

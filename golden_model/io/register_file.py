@@ -49,10 +49,7 @@ class RegisterFile:
             raise ValueError(f"generics are {', '.join(sorted(generics))}: expected {', '.join(GENERICS)}")
         self._constant = {**generics, "identification": self.map["identification"].reset, "version": version}
         self.status: dict[str, int] = {
-            field.name: 0
-            for register in self.map.values()
-            if register.kind is Kind.STATUS
-            for field in register.fields
+            field.name: 0 for register in self.map.values() if register.kind is Kind.STATUS for field in register.fields
         }
         self.reset()
 

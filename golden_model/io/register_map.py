@@ -236,9 +236,7 @@ def registers(settings: Mapping[str, Port] = fluxproof.REGISTERS) -> dict[str, R
     ordered = sorted(_read_only() + _writable(settings), key=lambda r: r.address)
     for before, after in pairwise(ordered):
         if before.address == after.address:
-            raise ValueError(
-                f"register map: {before.name} and {after.name} share address {after.address:#05x}"
-            )
+            raise ValueError(f"register map: {before.name} and {after.name} share address {after.address:#05x}")
     for register in ordered:
         check(register)
     result = {r.name: r for r in ordered}

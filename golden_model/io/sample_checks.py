@@ -89,9 +89,7 @@ def stimuli(rng, config):
         "u_dc_max": 300,
         "jump_max": 64,
     }
-    calm = dict.fromkeys(("i_a", "i_b", "i_c", "current_at_rail", "u_dc_at_rail", "code_theta"), 0) | {
-        "u_dc": 40000
-    }
+    calm = dict.fromkeys(("i_a", "i_b", "i_c", "current_at_rail", "u_dc_at_rail", "code_theta"), 0) | {"u_dc": 40000}
     rows = []
     for edge in (200 << 8, -(200 << 8), 40 << 8, -(40 << 8)):
         for near in (-1, 0, 1):

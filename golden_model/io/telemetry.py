@@ -89,9 +89,7 @@ def stimuli(rng, config):
     rows, wait = [], 0
     for clock in range(6000):
         stalled = 1500 < clock < 3000
-        ready = (
-            int(rng.integers(4) > 0) if clock < 1500 else int(not stalled and rng.integers(8) > clock // 1000)
-        )
+        ready = int(rng.integers(4) > 0) if clock < 1500 else int(not stalled and rng.integers(8) > clock // 1000)
         early = rng.integers(200) == 0
         row = {p.name: int(rng.integers(p.low, p.high + 1)) for p in ports}
         row |= {"m_axis_tready": ready, "sample_valid": int(wait == 0 or early), "enable": 1}
@@ -141,9 +139,7 @@ BLOCK = Block(
         {"ADC_BITS": 12, "POSITION_BITS": 18, "DEPTH_BITS": 5, "NUMBER_W": 7, "DROPPED_W": 5},
     ),
     too_wide=(0,),
-    width_from={
-        name: size for name, out in sample_latch.NAMES.items() if (size := sample_latch.sized(out))
-    },
+    width_from={name: size for name, out in sample_latch.NAMES.items() if (size := sample_latch.sized(out))},
     reference=None,
     bound=None,
     stimuli=stimuli,

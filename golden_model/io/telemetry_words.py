@@ -104,9 +104,7 @@ FIELDS = tuple(name for name in LAYOUT if name not in (HEADER, COUNTER))
 PACKET = tuple(name for name in FIELDS if name not in INPUTS)  # results of the core
 _MISSING = set(INPUTS) - set(FIELDS)
 if _MISSING:
-    raise ValueError(
-        f"telemetry: the golden model cannot replay a packet without {', '.join(sorted(_MISSING))}"
-    )
+    raise ValueError(f"telemetry: the golden model cannot replay a packet without {', '.join(sorted(_MISSING))}")
 
 
 def owner(name: str) -> str:
@@ -179,9 +177,7 @@ def stimuli(rng, config):
 
 def sized(name):
     """The function config -> Format of a code port, whose width is a generic, or None."""
-    return sample_latch.sized(
-        dict(zip(INPUTS, (p.name for p in sample_latch.BLOCK.outputs), strict=True))[name]
-    )
+    return sample_latch.sized(dict(zip(INPUTS, (p.name for p in sample_latch.BLOCK.outputs), strict=True))[name])
 
 
 BLOCK = Block(

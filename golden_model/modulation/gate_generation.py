@@ -139,9 +139,7 @@ def stimuli(rng, config):
     rows = []
     good = {"dead_time": 3, "min_pulse": 8}
     for period in range(36):
-        settings = {18: {"dead_time": 8, "min_pulse": 8}, 20: {"dead_time": 5, "min_pulse": 7}}.get(
-            period, good
-        )
+        settings = {18: {"dead_time": 8, "min_pulse": 8}, 20: {"dead_time": 5, "min_pulse": 7}}.get(period, good)
         settings = {24: {"dead_time": 3, "min_pulse": half + 1}, 26: {"dead_time": 0, "min_pulse": 4}}.get(
             period, settings
         )

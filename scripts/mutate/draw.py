@@ -98,9 +98,7 @@ def readers(module: dict) -> set:
     return bits
 
 
-def draw(
-    folder: Path, top: str, cells: int, count: int, seed: int, no_change: re.Pattern[str] | None = None
-) -> Drawn:
+def draw(folder: Path, top: str, cells: int, count: int, seed: int, no_change: re.Pattern[str] | None = None) -> Drawn:
     """``count`` mutations of the prepared netlist, each drawn once; fewer where there are no more.
 
     Left out: the clocks of registers, which are no logic, what is not read, and what ``no_change`` fits.

@@ -63,9 +63,7 @@ def pack(path: Path) -> Path:
 
 
 def main() -> int:
-    argparse.ArgumentParser(
-        prog="python -m scripts.package", description=__doc__.splitlines()[0]
-    ).parse_args()
+    argparse.ArgumentParser(prog="python -m scripts.package", description=__doc__.splitlines()[0]).parse_args()
     found = problems()
     if found:
         print("\n".join(f"package: {problem}" for problem in found), file=sys.stderr)

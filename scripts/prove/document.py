@@ -40,13 +40,9 @@ def table(entries: list[dict], day: str) -> str:
             rows.append(_row(entry["property"], entry["says"], method_of(entry), entry["assumed"], [entry]))
         elif entry is blocks[0]:
             depths = sorted(e["depth"] for e in blocks)
-            says = (
-                f"out_valid of each of {len(blocks)} blocks: LATENCY clocks after in_valid, never otherwise"
-            )
+            says = f"out_valid of each of {len(blocks)} blocks: LATENCY clocks after in_valid, never otherwise"
             method = f"induction, k = {depths[0]} to {depths[-1]}"
-            rows.append(
-                _row("pipeline_BLOCK", says, method, "samples at least the block's interval apart", blocks)
-            )
+            rows.append(_row("pipeline_BLOCK", says, method, "samples at least the block's interval apart", blocks))
     proved, planted = sum(e["pass"] for e in entries), [m for e in entries for m in e["mutants"]]
     caught, seconds = sum(m["caught"] for m in planted), sum(e["seconds"] for e in entries)
     rows.append(

@@ -45,18 +45,14 @@ def _prove(proof: Proof, entry: dict, limit: int) -> None:
     entry["pass"] = answer.status == "PASS"
     if not entry["pass"]:
         words = {"FAIL": "it is not so", "TIMEOUT": f"no answer within {limit} s: not proved"}
-        entry["reason"] = (
-            f"{words.get(answer.status, 'induction does not hold: not proved')} {answer.line}".strip()
-        )
+        entry["reason"] = f"{words.get(answer.status, 'induction does not hold: not proved')} {answer.line}".strip()
     if proof.covers:
         answer = ask(proof, "cover", "cover", proof.search_depth, proof.searched_with, RTL, False, limit)
         entry["seconds"] += answer.seconds
         entry["covered"] = answer.status == "PASS"
         if not entry["covered"]:
             entry["pass"] = False
-            entry["reason"] = (
-                entry["reason"] or f"within {proof.search_depth} clocks not everything covered is reached"
-            )
+            entry["reason"] = entry["reason"] or f"within {proof.search_depth} clocks not everything covered is reached"
 
 
 def _search(proof: Proof, entry: dict, limit: int) -> None:
@@ -66,15 +62,11 @@ def _search(proof: Proof, entry: dict, limit: int) -> None:
         entry["seconds"] += answer.seconds
         if answer.status != "PASS":
             entry["pass"] = False
-            entry["reason"] = (
-                entry["reason"] or f"with {dict(proof.searched_with)}: {answer.status} {answer.line}"
-            )
+            entry["reason"] = entry["reason"] or f"with {dict(proof.searched_with)}: {answer.status} {answer.line}"
             return
     for k, fault in enumerate(proof.faults):
         tree = plant(fault, FOLDER / proof.name / f"rtl_{k}")
-        answer = ask(
-            proof, f"fault_{k}", "search", proof.search_depth, proof.searched_with, tree, False, limit
-        )
+        answer = ask(proof, f"fault_{k}", "search", proof.search_depth, proof.searched_with, tree, False, limit)
         entry["seconds"] += answer.seconds
         caught = answer.status == "FAIL"
         entry["mutants"].append({"mutant": fault.says, "file": f"rtl/{fault.file}", "caught": caught})

@@ -98,13 +98,9 @@ def widths_in_use() -> dict[str, tuple[tuple[int, ...], ...]]:
         for name, reported in REPORTS.items():
             said = ' & " " & '.join(f"integer'image({width})" for width in reported)
             probe = f'    constant PROBE : natural := used("{name} " & {said});\n'
-            body, found = re.subn(
-                rf"(function {name} \([^\n]* is\n)", lambda m, p=probe: m.group(1) + p, body
-            )
+            body, found = re.subn(rf"(function {name} \([^\n]* is\n)", lambda m, p=probe: m.group(1) + p, body)
             if found != 1:
-                raise RuntimeError(
-                    f"rtl/{PACKAGE} has {found} functions {name} written on one line, expected one"
-                )
+                raise RuntimeError(f"rtl/{PACKAGE} has {found} functions {name} written on one line, expected one")
         (tree / PACKAGE).write_text(f"{declaration}package body fixed_pkg is{REPORTER}{body}")
         command = [str(ghdl), "--synth", "--std=08", "--out=none", f"--workdir={scratch}"]
         command += [*map(str, rtl_sources(tree)), "-e", "fluxproof"]
@@ -144,11 +140,7 @@ def vhdl(name: str) -> str:
     ports, lines = [], []
     for k, widths in enumerate(widths_in_use()[name]):
         expression, width, signed = call(name, widths)
-        kind = (
-            "std_logic"
-            if name == "exceeds"
-            else f"{'signed' if signed else 'unsigned'}({width - 1} downto 0)"
-        )
+        kind = "std_logic" if name == "exceeds" else f"{'signed' if signed else 'unsigned'}({width - 1} downto 0)"
         ports.append(f"y_{k} : out {kind}")
         lines.append(f"  y_{k} <= {expression};")
     between = ";\n    ".join(ports)
@@ -248,7 +240,7 @@ def proof(name: str) -> Proof:
     assumed = {
         "clamp": "the lower limit is not above the upper one",
         "plus_rounded": "the sum fits, which the caller sees to",
-        }
+    }
     return Proof(
         name=f"narrowing_{name}",
         says=f"{name} gives the exact result, limited and never wrapped, in every combination of widths in use",

@@ -33,18 +33,15 @@ def harness(
     """
     found = ports(verilog, entity)
     inputs = [
-        f"    input {width} {name}".replace("  ", " ")
-        for direction, width, name in found
-        if direction == "input"
+        f"    input {width} {name}".replace("  ", " ") for direction, width, name in found if direction == "input"
     ]
     strobes = {name for name, _ in ends} | ({"sample_busy", "early_samples"} if guarded else set())
     wired = [f".{name}({name})" for direction, _, name in found if direction == "input" or name in strobes]
     longest = max(latency for _, latency in ends)
-    checks = "\n".join(
-        f"    assert ({name} == flight[{latency - 1}]);\n    cover ({name});" for name, latency in ends
-    )
-    header, wires = ",\n".join(inputs), "\n  ".join(
-        f"wire {width} {name};" for _, width, name in found if name in strobes
+    checks = "\n".join(f"    assert ({name} == flight[{latency - 1}]);\n    cover ({name});" for name, latency in ends)
+    header, wires = (
+        ",\n".join(inputs),
+        "\n  ".join(f"wire {width} {name};" for _, width, name in found if name in strobes),
     )
     if guarded:
         checks += f"""

@@ -69,9 +69,7 @@ def ipxact(top: AddrmapNode, path: Path) -> Path:
     """An IP-XACT component (IEEE 1685-2009, as Vivado reads) with the memory map only."""
     path.parent.mkdir(parents=True, exist_ok=True)
     fresh = path.with_name(f".{path.name}.{os.getpid()}")
-    exporter = IPXACTExporter(
-        standard=Standard.IEEE_1685_2009, vendor="fluxproof", library="ip", version="1.0"
-    )
+    exporter = IPXACTExporter(standard=Standard.IEEE_1685_2009, vendor="fluxproof", library="ip", version="1.0")
     exporter.export(top, str(fresh), component_name=top.inst_name)
     fresh.replace(path)
     return path

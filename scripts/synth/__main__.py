@@ -108,9 +108,7 @@ def arguments_of() -> argparse.Namespace:
     )
     parser.add_argument("--block", nargs="+", metavar="ENTITY", help="count these entities alone, and stop")
     parser.add_argument("--board", action="store_true", help="count each choice of a board's front ends, and stop")
-    parser.add_argument(
-        "--family", nargs="+", choices=FAMILIES, metavar="FAMILY", help=f"of {', '.join(FAMILIES)}"
-    )
+    parser.add_argument("--family", nargs="+", choices=FAMILIES, metavar="FAMILY", help=f"of {', '.join(FAMILIES)}")
     parser.add_argument(
         "--only", nargs="+", choices=PARTS, metavar="PART", help=f"of {', '.join(PARTS)}; default: all but ecp5"
     )

@@ -101,9 +101,7 @@ def netlist_names(vhdl: Path) -> dict[str, str]:
     return names
 
 
-def check(
-    labels: Sequence[str], groups: Mapping[str, Sequence[str]] = GROUPS, where: str = f"rtl/{CORE}.vhd"
-) -> None:
+def check(labels: Sequence[str], groups: Mapping[str, Sequence[str]] = GROUPS, where: str = f"rtl/{CORE}.vhd") -> None:
     """Raises ValueError unless ``groups`` holds every label exactly once and no other."""
     claimed = [label for members in groups.values() for label in members]
     problems = [f"{name} is in no group" for name in labels if name not in claimed]

@@ -78,7 +78,7 @@ def _names(module: dict) -> dict[int, list[str]]:
 
 
 def vhdl_line(verilog: Sequence[str], source: str) -> str:
-    """"FILE.vhd:LINE" for yosys' src attribute: GHDL writes it in a comment above what it converts; else ""."""
+    """ "FILE.vhd:LINE" for yosys' src attribute: GHDL writes it in a comment above what it converts; else ""."""
     found = _LINE.search(source)
     if found:
         for line in reversed(verilog[: int(found[1])]):

@@ -67,9 +67,7 @@ def draw(counted: Mapping[str, Mapping[str, Count | None]], path: Path) -> Path:
             base = 0.0
             for name in ROWS:
                 value = getattr(groups[name], figure) if groups.get(name) else 0
-                panel.bar(
-                    k, value, bottom=base, color=COLOURS[name], width=0.7, label=name if k == 0 else None
-                )
+                panel.bar(k, value, bottom=base, color=COLOURS[name], width=0.7, label=name if k == 0 else None)
                 base += value
             panel.text(k, base, f"{base:g}", ha="center", va="bottom", fontsize=9)
         panel.set_xticks(range(len(counted)), list(counted))

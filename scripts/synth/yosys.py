@@ -66,17 +66,14 @@ def modules_of(verilog: str, entity: str, entities: Sequence[str]) -> list[str]:
     """
     names = re.findall(r"^module (\w+)", verilog, re.MULTILINE)
     owner = {
-        name: max((e for e in entities if name == e or name.startswith(f"{e}_")), key=len, default="")
-        for name in names
+        name: max((e for e in entities if name == e or name.startswith(f"{e}_")), key=len, default="") for name in names
     }
     return [name for name in names if owner[name] == entity]
 
 
 def part_of(verilog: str, modules: Sequence[str]) -> str:
     """``modules`` and what they instantiate, without the rest of the file."""
-    texts = {
-        re.match(r"module (\w+)", t).group(1): t for t in re.split(r"^(?=module )", verilog, flags=re.M)[1:]
-    }
+    texts = {re.match(r"module (\w+)", t).group(1): t for t in re.split(r"^(?=module )", verilog, flags=re.M)[1:]}
     needed, left = [], list(modules)
     while left:
         name = left.pop()

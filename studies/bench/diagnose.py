@@ -59,9 +59,7 @@ def columns(rows: int) -> dict[str, np.ndarray]:
         omega_ref=zeros, load=course[:, 0].copy(), u_dc=np.full(rows, drive.inverter.dc_bus_v), speed_mode=zeros,
         enable=ones, **references,
     )  # fmt: skip
-    machine = Machine.from_mapping(
-        vars(drive.machine) | {"resistance_ohm": 1.2 * drive.machine.resistance_ohm}
-    )
+    machine = Machine.from_mapping(vars(drive.machine) | {"resistance_ohm": 1.2 * drive.machine.resistance_ohm})
     samples, seen, _ = capture(drive, register_set, scenario, machine=machine, mode=IMPOSED_SPEED)
     table = {name: seen[name] * si_per_lsb(name, drive) for name in ("i_a", "i_b", "i_c", "u_dc")}
     table["omega_e"] = seen["omega_me"] * si_per_lsb("omega_me", drive)
@@ -93,9 +91,7 @@ def measured(recording: Path, out: Path) -> dict:
     seconds = time.perf_counter() - began
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode:
-        raise SystemExit(
-            f"{' '.join(command)} ended with {process.returncode}: {out.with_suffix('.txt').read_text()}"
-        )
+        raise SystemExit(f"{' '.join(command)} ended with {process.returncode}: {out.with_suffix('.txt').read_text()}")
     answer = json.loads((out / "diagnosis.json").read_text())
     return {
         "seconds": round(seconds, 2),
@@ -111,9 +107,7 @@ def main(sizes=ROWS) -> list[dict]:
     results = []
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
-        measured(
-            write(folder / "warm.parquet", columns(5000)), folder / "warm"
-        )  # fills the compile cache
+        measured(write(folder / "warm.parquet", columns(5000)), folder / "warm")  # fills the compile cache
         for rows in sizes:
             table = columns(rows)
             for suffix in FORMATS:

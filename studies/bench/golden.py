@@ -48,9 +48,7 @@ def controller_rate(register_set) -> list[float]:
 def closed_loop_rate(drive, register_set, repeat: int = 30) -> list[float]:
     """Fig. 9 repeated, with the averaged plant and converters."""
     scenario = fig9(drive)
-    references = np.stack(
-        [scenario.omega_ref, scenario.i_d_ref, scenario.i_q_ext, scenario.speed_mode], axis=1
-    )
+    references = np.stack([scenario.omega_ref, scenario.i_d_ref, scenario.i_q_ext, scenario.speed_mode], axis=1)
     references, load = np.tile(references, (repeat, 1)), np.tile(scenario.load, repeat)
     u_dc = np.tile(scenario.u_dc, repeat)
     machine = Machine.from_mapping(vars(drive.machine))
@@ -94,14 +92,10 @@ def main() -> None:
         "closed_loop_periods_per_s": closed_loop_rate(drive, register_set),
     }
     result = {name: round(statistics.median(values)) for name, values in figures.items()}
-    result |= {f"{name}_range": [round(min(v)), round(max(v))] for name, v in figures.items()} | {
-        "runs": RUNS
-    }
+    result |= {f"{name}_range": [round(min(v)), round(max(v))] for name, v in figures.items()} | {"runs": RUNS}
     path = write_json(BUILD / "bench" / "golden.json", result)
     for name, values in figures.items():
-        print(
-            f"{name:28s} median {statistics.median(values):12,.0f}  ({min(values):,.0f} .. {max(values):,.0f})"
-        )
+        print(f"{name:28s} median {statistics.median(values):12,.0f}  ({min(values):,.0f} .. {max(values):,.0f})")
     print(f"wrote {path.relative_to(ROOT)}")
 
 

@@ -88,9 +88,7 @@ def _effects_of(rng, stratum: str, turn: int) -> list[str]:
     """Names of the effects; ``turn`` counts the cases of the stratum, so that effects are equally frequent."""
     names = sorted(forms.EFFECTS)
     if stratum in ("single", "one_point"):
-        return (
-            [names[(turn // 2) % len(names)]] if stratum == "single" else [names[(turn * 5 + 3) % len(names)]]
-        )
+        return [names[(turn // 2) % len(names)]] if stratum == "single" else [names[(turn * 5 + 3) % len(names)]]
     if stratum == "masked":
         first = names[(turn * 7) % len(names)]
         return [first] if rng.random() < 0.6 else [first, str(rng.choice([n for n in names if n != first]))]

@@ -137,24 +137,18 @@ class Design:
 
     def _skew(self, tau):
         moved = -1j * self.p.omega * tau * self.psi + self.p.omega * tau * self._l(1j * self.p.i)
-        turned = (
-            -1j * self.p.omega * tau * self.psi_m / self.l_q
-        )  # ripple current that is measured in addition
+        turned = -1j * self.p.omega * tau * self.psi_m / self.l_q  # ripple current that is measured in addition
         return self._rows(mean=-1j * self.p.omega * moved, torque=-self._torque(self.psi, turned))
 
     def _turn(self, delta, line="mean"):
         z = -1j * delta * self.psi_m + self._l(1j * delta * self.p.i) - 1j * delta * self._l(self.p.i)
         if line != "mean":
             return self._rows(**{line: 1j * self.p.omega * z})
-        torque = self._torque(self._l(1j * delta * self.p.i), self.p.i) + self._torque(
-            self.psi, 1j * delta * self.p.i
-        )
+        torque = self._torque(self._l(1j * delta * self.p.i), self.p.i) + self._torque(self.psi, 1j * delta * self.p.i)
         return self._rows(mean=1j * self.p.omega * z, torque=torque)
 
     def _offset(self, o, common):
-        return self._rows(
-            m1=-self.r * o, p1=-1j * self.p.omega * (self.l_d - self.l_q) * np.conj(o), sum=3.0 * common
-        )
+        return self._rows(m1=-self.r * o, p1=-1j * self.p.omega * (self.l_d - self.l_q) * np.conj(o), sum=3.0 * common)
 
     def _gain(self, g):
         z = g * np.conj(self.p.i)
@@ -206,11 +200,7 @@ class Design:
             ],
             "iron_loss": lambda: [[self._iron(iron)]],
             "emf_harmonics": lambda: [
-                [
-                    self._rows(**{k: w * 0.015 * psi * p.omega})
-                    for k in ("p6", "m6", "p12", "m12")
-                    for w in both
-                ]
+                [self._rows(**{k: w * 0.015 * psi * p.omega}) for k in ("p6", "m6", "p12", "m12") for w in both]
             ],
             "delay": lambda: [[self._rows(mean=1j * p.omega * 10e-6 * self.u)]],
             "sampling_skew": lambda: [[self._skew(1e-6)]],
@@ -222,13 +212,9 @@ class Design:
             "current_gain": lambda: [[self._gain(0.02 * w) for w in both]],
             "current_scale": lambda: [[self._scale(0.03)]],
             "udc_gain": lambda: [[self._rows(mean=0.02 * self.u)]],
-            "phase_resistance_asymmetry": lambda: [
-                [self._rows(m2=0.1 * self.r * w * np.conj(p.i)) for w in both]
-            ],
+            "phase_resistance_asymmetry": lambda: [[self._rows(m2=0.1 * self.r * w * np.conj(p.i)) for w in both]],
             "cogging": lambda: [[self._rows(cog=0.05 * rated * w) for w in both]],
-            "friction": lambda: [
-                [self._rows(torque=-0.05 * rated * w) for w in (np.sign(p.omega), p.omega / level)]
-            ],
+            "friction": lambda: [[self._rows(torque=-0.05 * rated * w) for w in (np.sign(p.omega), p.omega / level)]],
         }
         return give[name]()
 
@@ -274,12 +260,7 @@ class Design:
         y = y + self._dead(lost / np.maximum(np.abs(self.unit), 1e-9))
         share = {P.DELAY_MIX: br.delay, P.DELAY_HALF: 0.5, P.DELAY_SHIFT: 0.1}[br.delay_kind]
         y = y + self._rows(mean=1j * p.omega * share * self.T * self.u)
-        y = (
-            y
-            + self._turn(course.theta_offset[at])
-            + self._turn(0.5 * s.ecc_1, "pe")
-            + self._turn(0.5 * s.ecc_1, "me")
-        )
+        y = y + self._turn(course.theta_offset[at]) + self._turn(0.5 * s.ecc_1, "pe") + self._turn(0.5 * s.ecc_1, "me")
         o = 2.0 / 3.0 * (course.offsets[:, at] * spin).sum(0)
         y = y + self._offset(o, course.offsets[:, at].mean(0))
         gains = np.array((s.gain_a, s.gain_b, s.gain_c))
@@ -288,7 +269,5 @@ class Design:
         if len(h.cogging):
             y = y + self._rows(cog=h.cogging[0, 1] * np.exp(1j * h.cogging[0, 2]))
         omega_m = p.omega / self.pairs
-        extra = (h.viscous - b.nominal.machine["viscous_friction_nms"]) * omega_m + h.coulomb * np.sign(
-            omega_m
-        )
+        extra = (h.viscous - b.nominal.machine["viscous_friction_nms"]) * omega_m + h.coulomb * np.sign(omega_m)
         return y + self._rows(torque=-extra)

@@ -225,14 +225,10 @@ def figures(cases, resolved=()) -> dict:
         "false_alarm_healthy": rate(
             "false_alarm_healthy", [a.get("verdict") != "no_mismatch" for t, a in by["healthy"]]
         ),
-        "truth_inside_ambiguity": rate(
-            "truth_inside_ambiguity", [inside_ambiguity(t, a) for t, a in said_tied]
-        ),
+        "truth_inside_ambiguity": rate("truth_inside_ambiguity", [inside_ambiguity(t, a) for t, a in said_tied]),
         "request_resolves_tie": rate("request_resolves_tie", [r["resolved"] for r in asked]),
         "ambiguous_without_request": rate("", [not r["asked"] for r in resolved]),
-        "unknown_recognised": rate(
-            "unknown_recognised", [unknown_recognised(a) for t, a in by["unknown"]]
-        ),
+        "unknown_recognised": rate("unknown_recognised", [unknown_recognised(a) for t, a in by["unknown"]]),
         "damage_found": rate("", [problem_found(t, a) for t, a in by["damaged"]]),
         # If the effect is not identifiable: correct, or at least nothing wrong asserted.
         "not_identifiable_honest": rate("", [not confidently_wrong(t, a) for t, a in blind]),

@@ -31,14 +31,10 @@ def dead_time(b, rng, size, form):
         )
         return {"v_dead_v": bus * dead / T + v}
     zone = rng.uniform(0.02, 0.06) * i_r
-    kind = {"tanh_diode": P.DIRECTION_TANH, "atan": P.DIRECTION_ATAN, "capacitance": P.DIRECTION_CAPACITANCE}[
-        form
-    ]
+    kind = {"tanh_diode": P.DIRECTION_TANH, "atan": P.DIRECTION_ATAN, "capacitance": P.DIRECTION_CAPACITANCE}[form]
     device = P.DROP_ATAN if form == "atan" else P.DROP_DIODE
     scale = 1.0 if form == "atan" else 1.0 / math.asinh(20.0)
-    b.change(
-        "bridge", dead_s=dead, direction=kind, i_zone=zone, drop=device, v_drop=v * scale, i_drop=0.03 * i_r
-    )
+    b.change("bridge", dead_s=dead, direction=kind, i_zone=zone, drop=device, v_drop=v * scale, i_drop=0.03 * i_r)
     return {"v_dead_v": bus * dead / T + v}
 
 
@@ -140,9 +136,7 @@ def saturation(b, rng, size, form):
         kind_d = kind_q = P.SELF_CUBIC
         sat_d, sat_q = min(loss_d, 0.22) / i_r**2, min(loss_q, 0.22) / i_r**2
     else:
-        kind_q = {"tanh": P.SELF_TANH, "rational": P.SELF_RATIONAL, "langevin": P.SELF_LANGEVIN}.get(
-            form, P.SELF_ROOT
-        )
+        kind_q = {"tanh": P.SELF_TANH, "rational": P.SELF_RATIONAL, "langevin": P.SELF_LANGEVIN}.get(form, P.SELF_ROOT)
         kind_d = P.SELF_SHIFTED if form == "shifted_d" else kind_q
         sat_d, sat_q = _knee(kind_d, loss_d) * i_r, _knee(kind_q, loss_q) * i_r
     b.change("motor", self_d=kind_d, self_q=kind_q, sat_d=sat_d, sat_q=sat_q, shift_d=0.4 * sat_d)

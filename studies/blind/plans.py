@@ -40,9 +40,7 @@ def _fits(n: Nominal, omega, i_d, i_q):
 def _top_speed(n: Nominal, points):
     """Highest electrical speed at which every point has a voltage reserve, at most the rated one."""
     omega = n.omega_rated
-    while omega > 0.05 * n.omega_rated and not all(
-        _fits(n, s * omega, d, q) for d, q in points for s in (1, -1)
-    ):
+    while omega > 0.05 * n.omega_rated and not all(_fits(n, s * omega, d, q) for d, q in points for s in (1, -1)):
         omega *= 0.97
     return omega
 
@@ -111,9 +109,7 @@ def masked_plan(rng, n: Nominal) -> Plan:
 
 def steps(plan: Plan, column: int):
     """A value of the segments for each row, shape (n,)."""
-    return np.repeat(
-        [segment[column] for segment in plan.segments], [segment[3] for segment in plan.segments]
-    )
+    return np.repeat([segment[column] for segment in plan.segments], [segment[3] for segment in plan.segments])
 
 
 def course(plan: Plan, n: Nominal) -> P.Course:

@@ -147,9 +147,7 @@ def print_figures(result: dict):
         if f.get("value") is None:
             print(f"{name:28s} no case")
             continue
-        interval = (
-            f" [{f['low']:.3f}, {f['high']:.3f}] {f['k']} of {f['n']}" if "low" in f else f" n = {f['n']}"
-        )
+        interval = f" [{f['low']:.3f}, {f['high']:.3f}] {f['k']} of {f['n']}" if "low" in f else f" n = {f['n']}"
         verdict = "" if "met" not in f else f"   target {f['target']}: {'met' if f['met'] else 'MISSED'}"
         print(f"{name:28s} {f['value']:.4g}{interval}{verdict}")
 

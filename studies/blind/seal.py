@@ -39,12 +39,8 @@ def unseal(folder: Path) -> dict:
     try:
         packed, wanted = path.read_bytes(), note.read_text().strip()
     except OSError as error:
-        raise SealError(
-            f"{error.filename}: cannot be read: {error.strerror}; run studies.blind.generate"
-        ) from None
+        raise SealError(f"{error.filename}: cannot be read: {error.strerror}; run studies.blind.generate") from None
     found = hashlib.sha256(packed).hexdigest()
     if found != wanted:
-        raise SealError(
-            f"{path}: SHA-256 is {found}, sealed was {wanted}: the truth was changed after sealing"
-        )
+        raise SealError(f"{path}: SHA-256 is {found}, sealed was {wanted}: the truth was changed after sealing")
     return json.loads(zlib.decompress(packed))

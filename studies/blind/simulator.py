@@ -215,9 +215,7 @@ def run(drive, course, noise, start, duty_start, substeps, rows, trace):
                 if dead:
                     steps += int(length * u_dc / (b.i_zone * l_min))
                 steps = min(steps, 60) * substeps
-                advance(
-                    drive, s, mid, legs, length, steps, u_dc, r_scale, psi_scale, load, slope, k1, k2, mean
-                )
+                advance(drive, s, mid, legs, length, steps, u_dc, r_scale, psi_scale, load, slope, k1, k2, mean)
                 if sen.lowpass_s > 0.0:
                     share = 1.0 - math.exp(-length / sen.lowpass_s)
                     i_b = -0.5 * s[IA] + 0.5 * ROOT3 * s[IB]
@@ -245,9 +243,7 @@ def run(drive, course, noise, start, duty_start, substeps, rows, trace):
         speed += (1.0 - math.exp(-T * sen.omega_filter_rad_s)) * ((angle - angle_old) / T - speed)
         angle_old = angle
         omega = omega_true if sen.omega_exact else speed
-        u_meas = rounded(
-            course.u_dc[k] * (1.0 + sen.u_gain) + sen.u_offset + sen.u_noise * noise[k, 4], sen.u_lsb
-        )
+        u_meas = rounded(course.u_dc[k] * (1.0 + sen.u_gain) + sen.u_offset + sen.u_noise * noise[k, 4], sen.u_lsb)
         i_d_ref, i_q_ref = course.i_d_ref[k], course.i_q_ref[k]
         if c.speed_loop:
             i_q_ref = speed_control(c, memory, p * course.omega[k], omega, T)

@@ -41,9 +41,7 @@ def by_stratum(cases) -> dict:
             "cases": len(part),
             "identifiable": sum(identifiable(t) for t, a in part),
             "named_right": rate("", [named_right(t, a) for t, a in part]),
-            "inside_ambiguity": rate(
-                "", [a.get("verdict") == "ambiguous" and inside_ambiguity(t, a) for t, a in part]
-            ),
+            "inside_ambiguity": rate("", [a.get("verdict") == "ambiguous" and inside_ambiguity(t, a) for t, a in part]),
             "confidently_wrong": rate("", [confidently_wrong(t, a) for t, a in part]),
             "verdicts": dict(Counter(a.get("verdict", "error") for t, a in part)),
         }

@@ -19,9 +19,7 @@ def inter_turn_short(b: Build, rng, size):
 def low_flux_order(b: Build, rng, size):
     """A flux harmonic of electrical order 2 or 3 in dq, as of a damaged magnet pole."""
     a = 0.02 * size * b.nominal.machine["magnet_flux_wb"]
-    b.change(
-        "motor", psi_h=np.array([(rng.choice((2.0, 3.0)), a, rng.uniform(0, 6), a * 0.6, rng.uniform(0, 6))])
-    )
+    b.change("motor", psi_h=np.array([(rng.choice((2.0, 3.0)), a, rng.uniform(0, 6), a * 0.6, rng.uniform(0, 6))]))
 
 
 def sensor_lowpass(b: Build, rng, size):

@@ -38,9 +38,7 @@ def compare(seed: int, count: int, jobs: int) -> dict:
         for answer in pool.imap(answers_of, work):
             answers.append(answer)
             spent = time.perf_counter() - began
-            print(
-                f"\r{len(answers)} of {len(work)} cases, {spent:.0f} s ", end="", file=sys.stderr, flush=True
-            )
+            print(f"\r{len(answers)} of {len(work)} cases, {spent:.0f} s ", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     return {
         "schema": 1,
@@ -50,9 +48,7 @@ def compare(seed: int, count: int, jobs: int) -> dict:
         "tuned_on_seed": settings["seed"],
         "settings": settings["methods"],
         "cases": {s: sum(t["stratum"] == s for t in truths) for s in STRATA},
-        "methods": {
-            name: summary([(t, a[name]) for t, a in zip(truths, answers, strict=True)]) for name in TITLES
-        },
+        "methods": {name: summary([(t, a[name]) for t, a in zip(truths, answers, strict=True)]) for name in TITLES},
         "each": [_line(t, a) for t, a in zip(truths, answers, strict=True)],
     }
 
@@ -75,9 +71,7 @@ def main(arguments=None) -> int:
     """The command line; returns 0, or 2 if a package or the truth is missing."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument(
-        "--count", type=int, default=175, help="size of the benchmark to generate if there is none"
-    )
+    parser.add_argument("--count", type=int, default=175, help="size of the benchmark to generate if there is none")
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args(arguments)
     if missing():

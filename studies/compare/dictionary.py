@@ -124,7 +124,5 @@ def equations(data: Data, rows: int) -> list[Equation]:
         parts = {"u_d": y.real, "u_q": y.imag} if channel == "u" else {channel: y}
         for name, part in parts.items():
             target = averaged(part[use], rows).ravel()
-            out.append(
-                Equation(name, list(terms), fitted / scale, target, blocks / scale, part.mean(axis=1), scale)
-            )
+            out.append(Equation(name, list(terms), fitted / scale, target, blocks / scale, part.mean(axis=1), scale))
     return out

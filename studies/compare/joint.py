@@ -20,9 +20,7 @@ from studies.compare.naming import one_factor
 MOST_BLOCKS = 90  # evenly chosen; more would only take longer
 FIT_GRID = [{"rows": 20}]
 NAME_GRID = [
-    {"floor": f, "share": s}
-    for f in (0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5)
-    for s in (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5)
+    {"floor": f, "share": s} for f in (0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5) for s in (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5)
 ]
 STEP = 1e-3  # of a parameter's unit, for slopes
 FACTORS = {"resistance": "R", "inductance_d": "L_d", "inductance_q": "L_q", "magnet_flux": "psi_m"}
@@ -55,9 +53,7 @@ def _sigma(misfit, rows):
     out = {}
     for name, x in misfit.items():
         step = np.diff(averaged(x, rows), axis=1)
-        both = (
-            np.concatenate([step.real.ravel(), step.imag.ravel()]) if np.iscomplexobj(step) else step.ravel()
-        )
+        both = np.concatenate([step.real.ravel(), step.imag.ravel()]) if np.iscomplexobj(step) else step.ravel()
         out[name] = float(np.nanmedian(np.abs(both)) / 0.954) + 1e-12
     return out
 

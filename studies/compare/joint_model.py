@@ -29,9 +29,7 @@ PARAMETERS = {
     "sat_q": ("saturation", 0.05),
     "cross": ("cross_saturation", 0.02),  # of psi_m, at rated i_q
     "g_fe": ("iron_loss", 0.02),  # of the rated current, at the largest EMF
-    **{
-        f"h{h}{part}": ("emf_harmonics", 0.002) for h in (6, 12) for part in ("fc", "fs", "bc", "bs")
-    },  # of psi_m
+    **{f"h{h}{part}": ("emf_harmonics", 0.002) for h in (6, 12) for part in ("fc", "fs", "bc", "bs")},  # of psi_m
     "delay": ("delay", 0.05),  # of a sample time
     "skew": ("sampling_skew", 0.005),  # of a sample time
     "angle": ("encoder_offset", 0.02),  # rad

@@ -108,9 +108,7 @@ def _one_factor(data, plain, names):
         "inductance_q": (("u_d", "w q"), -top * m.inductance_q_h * m.rated_current_a),
         "magnet_flux": (("u_q", "w"), top * m.magnet_flux_wb),
     }
-    change = {
-        n: plain[key] * unit / volts for n, (key, volts) in nominal.items() if n in names and key in plain
-    }
+    change = {n: plain[key] * unit / volts for n, (key, volts) in nominal.items() if n in names and key in plain}
     left = one_factor(list(names), change)
     merged = float(np.sqrt(sum(size**2 for name, size in names.items() if name not in left)))
     return {name: names.get(name, merged) for name in left}

@@ -50,9 +50,7 @@ def answers_of(job: tuple[Path, dict]) -> dict[str, dict]:
     for name in TITLES:
         began = time.perf_counter()
         try:
-            answer, left[name] = (
-                _diagnose(folder) if name == "diagnose" else _other(name, settings[name], folder)
-            )
+            answer, left[name] = _diagnose(folder) if name == "diagnose" else _other(name, settings[name], folder)
             answers[name] = answer | {"seconds": time.perf_counter() - began}
         except Exception as error:  # the comparison counts exceptions and continues
             answers[name] = {"error": f"{type(error).__name__}: {error}"}
@@ -90,12 +88,8 @@ def summary(cases: list[tuple[dict, dict]]) -> dict:
         ),
         "pairs_exactly_right": figures.rate("", [figures.named_right(t, a) for t, a in fair["pair"]]),
         "confidently_wrong": figures.rate("", [figures.confidently_wrong(t, a) for t, a in cases]),
-        "false_alarm_healthy": figures.rate(
-            "", [a.get("verdict") != "no_mismatch" for t, a in part["healthy"]]
-        ),
-        "says_it_cannot_tell": figures.rate(
-            "", [a.get("verdict") in ("ambiguous", "unexplained") for t, a in cases]
-        ),
+        "false_alarm_healthy": figures.rate("", [a.get("verdict") != "no_mismatch" for t, a in part["healthy"]]),
+        "says_it_cannot_tell": figures.rate("", [a.get("verdict") in ("ambiguous", "unexplained") for t, a in cases]),
         "holdout_over_floor": _quantiles(ratios),
         "seconds": _quantiles(seconds),
         "breakdowns": sum("error" in a for t, a in cases),

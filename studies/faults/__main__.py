@@ -40,9 +40,7 @@ def row(case: Case, outcome: Outcome) -> dict:
         "gates": "on" if trip is None else "off",
         "clocks_to_off": None if trip is None else trip - o.decided,
         "clocks_from_sample": None if trip is None or o.strobed is None else trip - o.strobed,
-        "after_ms": None
-        if trip is None
-        else round((trip - o.begin(case.start)) / o.period_clocks * PERIOD_MS, 2),
+        "after_ms": None if trip is None else round((trip - o.begin(case.start)) / o.period_clocks * PERIOD_MS, 2),
         "flags": named(int(o.column("fault_flags")[o.begin(clear)])),
         "first": named(int(o.column("first_fault")[o.begin(clear)])),
         "early_samples": int(o.column("early_samples").max()),
@@ -79,9 +77,7 @@ def problems(case: Case, outcome: Outcome, result: dict) -> list[str]:
             found.append("a gate was on between trip and clear")
         if result["no_current_after_ms"] is None:
             found.append("the current did not decay")
-    if not set(case.flags) <= set(result["flags"]) or (
-        case.trips is None and set(case.flags) != set(result["flags"])
-    ):
+    if not set(case.flags) <= set(result["flags"]) or (case.trips is None and set(case.flags) != set(result["flags"])):
         found.append(f"flags {result['flags']}, expected {case.flags}")
     if not o.column("running")[-1] or abs(result["rpm_at_the_end"] - case.rpm) >= NEAR_RPM:
         found.append(f"not back at {case.rpm:g} rpm: {result['rpm_at_the_end']} rpm")

@@ -155,9 +155,7 @@ class Pair:
         """``==`` on every value of the last sample, once they are valid."""
         if not self.entered or self.golden.clock - self.entered[-1] < clocked.INTERVAL:
             return
-        for name, got, wanted in zip(
-            fluxproof.Observed._fields, self.core.values(), self.golden.observed, strict=True
-        ):
+        for name, got, wanted in zip(fluxproof.Observed._fields, self.core.values(), self.golden.observed, strict=True):
             if got != wanted:
                 self.differ(self.golden.clock, f"{name}: got {got}, wanted {wanted}")
         self.samples += 1

@@ -50,9 +50,7 @@ def jump(plan: Plan) -> None:
 
 def strobes(*clocks: int, codes: dict[str, int] | None = None) -> Callable[[Plan], None]:
     """The strobes of a period, the first with the true codes and the others with ``codes``."""
-    return lambda plan: setattr(
-        plan, "strobes", {at: (codes or {}) if n else {} for n, at in enumerate(clocks)}
-    )
+    return lambda plan: setattr(plan, "strobes", {at: (codes or {}) if n else {} for n, at in enumerate(clocks)})
 
 
 def registers(**values: int) -> Callable[[Plan], None]:
@@ -149,9 +147,7 @@ def extremes(register_set) -> Case:
             plan.pulse("clear_trip", STOP_AT)
 
     text = "each register at both ends of its range"
-    return Case(
-        "register writes", text, disturb, clears=(), start=QUIET, periods=QUIET + BLOCK * len(ENDS) + 200
-    )
+    return Case("register writes", text, disturb, clears=(), start=QUIET, periods=QUIET + BLOCK * len(ENDS) + 200)
 
 
 def extremes_verdict(outcome: Outcome, register_set) -> dict:

@@ -116,7 +116,7 @@ def cost(study: Study) -> list[dict]:
     """Cost against the number of recordings: ten recordings, copied under other contents, so that all cost the same."""
     runs.production(study.line, study.seed, study.count, study.rows, study.kind, study.workers)
     listed = [e for e in entries([str(study.line / "manifest.csv")], None)][:10]
-    numbers = sorted({10, *(round(10 ** x) for x in (1.5, 2.0, 2.5)), study.count})
+    numbers = sorted({10, *(round(10**x) for x in (1.5, 2.0, 2.5)), study.count})
     numbers = [n for n in numbers if n <= study.count]
     seconds = []
     for number in numbers:

@@ -129,9 +129,7 @@ def trace(result: Result, scene: Scenario, drive=DRIVE) -> Trace:
     )
 
 
-def run(
-    scene: Scenario, register_set: RegisterSet = NOMINAL, machine: Machine | None = None, **options
-) -> Trace:
+def run(scene: Scenario, register_set: RegisterSet = NOMINAL, machine: Machine | None = None, **options) -> Trace:
     """One scenario on the paper's drive."""
     return trace(simulate(DRIVE, register_set, scene, machine, **options), scene)
 

@@ -64,9 +64,7 @@ def saturation_and_reversal() -> Experiment:
         ("forward again", window(2.2, 2.3)),
     ):
         left, model = mean_error(view, part), mean_error(linear, part)
-        found.append(
-            Finding(f"Saturating motor: steady error, {name}", None, left, "% of lambda_n", left < 0.2)
-        )
+        found.append(Finding(f"Saturating motor: steady error, {name}", None, left, "% of lambda_n", left < 0.2))
         found.append(
             Finding(
                 f"Saturating motor: the same of the linear current model, {name}",
@@ -88,9 +86,7 @@ def saturation_and_reversal() -> Experiment:
         )
     )
     worst = 100 * max(np.abs(view.error(axis)[through]).max() for axis in "dq")
-    found.append(
-        Finding("Saturating motor: worst sample below 60 rpm", None, worst, "% of lambda_n", worst < 10)
-    )
+    found.append(Finding("Saturating motor: worst sample below 60 rpm", None, worst, "% of lambda_n", worst < 10))
     return Experiment(
         "A motor that saturates: both directions, through zero",
         found,
@@ -222,9 +218,7 @@ def current_step() -> Experiment:
         view = views[f"{rpm} rpm"] = run(scene, mode=IMPOSED_SPEED)
         worst = view.worst(window(0.29, 0.5))
         found.append(
-            Finding(
-                f"Current step 0 to 3.7 A, {rpm} rpm: worst sample", None, worst, "% of lambda_n", worst < 3
-            )
+            Finding(f"Current step 0 to 3.7 A, {rpm} rpm: worst sample", None, worst, "% of lambda_n", worst < 3)
         )
     return Experiment("A step of the current reference", found, views)
 

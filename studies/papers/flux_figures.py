@@ -50,20 +50,14 @@ def figs_3_4() -> Experiment:
     for axis in "dq":
         left = 100 * proposed.error(axis)[end].mean()
         found.append(
-            Finding(
-                f"Fig. 4: steady error of eq. (17), {axis} axis", 0.0, left, "% of lambda_n", abs(left) < 0.2
-            )
+            Finding(f"Fig. 4: steady error of eq. (17), {axis} axis", 0.0, left, "% of lambda_n", abs(left) < 0.2)
         )
     worst = proposed.worst(end)
     found.append(
-        Finding(
-            "Fig. 4: worst sample of the last 100 ms, both axes", None, worst, "% of lambda_n", worst < 0.2
-        )
+        Finding("Fig. 4: worst sample of the last 100 ms, both axes", None, worst, "% of lambda_n", worst < 0.2)
     )
     found.append(
-        Finding(
-            "Fig. 4: worst sample from the torque step on", None, proposed.worst(step), "% of lambda_n", True
-        )
+        Finding("Fig. 4: worst sample from the torque step on", None, proposed.worst(step), "% of lambda_n", True)
     )
     return Experiment(
         "Figs. 3, 4: 239 rpm, nominal torque step, magnetic parameters x 1.3",
@@ -163,14 +157,10 @@ def figs_11_12() -> Experiment:
             )
         )
         found.append(
-            Finding(
-                f"Fig. 12: worst sample of the whole run, {name}", None, worst, "% of lambda_n", worst < 25
-            )
+            Finding(f"Fig. 12: worst sample of the whole run, {name}", None, worst, "% of lambda_n", worst < 25)
         )
         found.append(
-            Finding(
-                f"Fig. 12: steady error after release, {name}", "follows", end, "% of lambda_n", end < 0.2
-            )
+            Finding(f"Fig. 12: steady error after release, {name}", "follows", end, "% of lambda_n", end < 0.2)
         )
     return Experiment("Figs. 11, 12: 119 % load at low speed; blocked rotor at 127 %, release", found, views)
 
@@ -188,9 +178,7 @@ def stepped(name: str, factors: dict[float, float], rpm: float) -> Scenario:
 def settling_ms(view: Trace, start: float, end: float) -> float:
     """From a step until both errors stay within SETTLED of lambda_n."""
     part = window(start, end)
-    outside = np.flatnonzero(
-        np.maximum(np.abs(view.error("d")[part]), np.abs(view.error("q")[part])) > SETTLED
-    )
+    outside = np.flatnonzero(np.maximum(np.abs(view.error("d")[part]), np.abs(view.error("q")[part])) > SETTLED)
     return 0.0 if not len(outside) else (outside[-1] + 1) * T_S * 1e3
 
 
@@ -249,9 +237,7 @@ def fig_2() -> Experiment:
         for rpm in SENSITIVITY_RPM:
             scene, end = held_at(rpm, i_d, i_q), window(0.5, 0.6)
             up, down = (run(scene, scaled(NOMINAL, {"r_s": f}), mode=IMPOSED_SPEED) for f in (1.1, 0.9))
-            got = {
-                x: (up.estimate[x][end].mean() - down.estimate[x][end].mean()) / 0.2 / LAMBDA_N for x in "dq"
-            }
+            got = {x: (up.estimate[x][end].mean() - down.estimate[x][end].mean()) / 0.2 / LAMBDA_N for x in "dq"}
             omega = rpm * RPM * DRIVE.machine.pole_pairs
             wanted = {"d": -i_q * resistance / omega / LAMBDA_N, "q": i_d * resistance / omega / LAMBDA_N}
             points.append((i_d, i_q, rpm, got["d"], got["q"], wanted["d"], wanted["q"]))

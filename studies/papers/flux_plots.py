@@ -19,9 +19,7 @@ def _legend(axis) -> None:
     axis.legend(loc="lower right", bbox_to_anchor=(1, 0.98), borderpad=0, ncols=3, frameon=False, fontsize=9)
 
 
-def fluxes(
-    views: dict[str, Trace], title: str, start: float = SETTLED_MS, end: float | None = None
-) -> Figure:
+def fluxes(views: dict[str, Trace], title: str, start: float = SETTLED_MS, end: float | None = None) -> Figure:
     """Actual flux linkages in grey, the estimates over them: d above, q below; times in ms."""
     figure, axes = _axes(2, 1, size=(WIDTH, 4.2), sharex=True)
     for axis, x in zip(axes, "dq", strict=True):
@@ -108,9 +106,7 @@ def fig_2(e: Experiment) -> dict[str, Figure]:
         rows = table[(table[:, 0] == i_d) & (table[:, 1] == i_q)]
         for n, (axis, current) in enumerate(zip(axes, (-i_q, i_d), strict=True)):
             axis.plot(rpm, current * resistance / omega / LAMBDA_N, color=colour, linewidth=1.0)
-            axis.plot(
-                rows[:, 2], rows[:, 3 + n], "o", color=colour, markersize=3.5, label=f"{i_d:g}, {i_q:g} A"
-            )
+            axis.plot(rows[:, 2], rows[:, 3 + n], "o", color=colour, markersize=3.5, label=f"{i_d:g}, {i_q:g} A")
     for axis, x in zip(axes, "dq", strict=True):
         axis.set(xscale="log", xlabel="rpm", title=f"Fig. 2: $\\lambda_{x}$")
         axis.set_xticks(ticks := (150, 375, 900, 2500), [str(tick) for tick in ticks])
@@ -124,9 +120,7 @@ def saturation_and_reversal(e: Experiment) -> dict[str, Figure]:
     view = e.traces["estimate"]
     return {
         "motion": motion(view, "Reversal under load"),
-        "flux": fluxes(
-            {"estimate": view, "linear model": e.traces["linear current model"]}, "A motor that saturates"
-        ),
+        "flux": fluxes({"estimate": view, "linear model": e.traces["linear current model"]}, "A motor that saturates"),
         "error": errors(e.traces, "Error through zero speed"),
     }
 
@@ -138,9 +132,7 @@ def brusa_map(e: Experiment) -> dict[str, Figure]:
     grid = e.traces["grid"]
     figure, axes = _axes(1, 2, size=(WIDTH, 3.0), sharey=True)
     for axis, column, title in zip(axes, (3, 2), ("Linear nameplate", "Estimate"), strict=True):
-        points = axis.scatter(
-            grid[:, 0], grid[:, 1], c=grid[:, column], s=150, marker="s", cmap="viridis", zorder=3
-        )
+        points = axis.scatter(grid[:, 0], grid[:, 1], c=grid[:, column], s=150, marker="s", cmap="viridis", zorder=3)
         figure.colorbar(points, ax=axis, label="% of the map's flux")
         axis.set(title=title, xlabel="$i_d$ [A]")
     axes[0].set_ylabel("$i_q$ [A]")
@@ -182,9 +174,7 @@ def stability(e: Experiment) -> dict[str, Figure]:
         label = f"L x {inductance:g}, R x {resistance:g}"
         axis.plot(e.traces["speeds"], curve, linewidth=0.9, label=label)
     axis.axhline(1.0, color=REFERENCE, linewidth=1.1)
-    axis.set(
-        title="Largest eigenvalue of drive and estimator", xlabel="electrical speed [rad/s]", ylabel="modulus"
-    )
+    axis.set(title="Largest eigenvalue of drive and estimator", xlabel="electrical speed [rad/s]", ylabel="modulus")
     axis.legend(frameon=False, fontsize=7, ncols=3, loc="lower center")
     return {"eigenvalues": figure}
 

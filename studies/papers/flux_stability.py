@@ -22,9 +22,7 @@ FLUX, VOLTAGE, INTEGRAL, INTEGRAL_1, MERGED, X, COMPENSATION, LEARNT = range(8)
 class Gains:
     """What the registers of a drive hold, in SI units, and the factors by which the estimator is wrong."""
 
-    def __init__(
-        self, drive=DRIVE, inductance_factor: float = 1.0, resistance_factor: float = 1.0, **changes: float
-    ):
+    def __init__(self, drive=DRIVE, inductance_factor: float = 1.0, resistance_factor: float = 1.0, **changes: float):
         m, entries = drive.machine, {e.name: e.si for e in flux_estimator(drive)} | changes
         self.t_s, self.resistance = drive.sample_time_s, m.resistance_ohm
         self.inductance = (m.inductance_d_h + m.inductance_q_h) / 2
@@ -93,20 +91,14 @@ def stability() -> Experiment:
     legal_w = np.geomspace(2.0**-10, 0.25, 60)
     merge = max(merge_radius(w, xi) for w in legal_w for xi in np.linspace(0.25, 2.0, 60))
     speeds = np.concatenate([-(s := np.geomspace(1.0, 2 * DRIVE.bases.omega_me_rad_s, 120)), s])
-    found = [
-        Finding(
-            "Merge: largest pole over every legal omega_0 and xi", None, float(merge), "modulus", merge < 1
-        )
-    ]
+    found = [Finding("Merge: largest pole over every legal omega_0 and xi", None, float(merge), "modulus", merge < 1)]
     curves = {}
     for inductance in (0.7, 1.0, 1.3):
         for resistance in (0.6, 1.0, 1.4):
             g = Gains(inductance_factor=inductance, resistance_factor=resistance)
             curves[inductance, resistance] = np.array([radius(w, g) for w in speeds])
     worst = max(curve.max() for curve in curves.values())
-    label = (
-        "Drive and estimator: largest eigenvalue up to twice the rated speed, L x 0.7 to 1.3, R x 0.6 to 1.4"
-    )
+    label = "Drive and estimator: largest eigenvalue up to twice the rated speed, L x 0.7 to 1.3, R x 0.6 to 1.4"
     found.append(Finding(label, "stable", float(worst), "modulus", worst < 1))
     slowest = -DRIVE.sample_time_s * 1e3 / math.log(curves[1.0, 1.0][np.abs(speeds) > 80].max())
     found.append(

@@ -61,17 +61,13 @@ def any_i_d() -> Experiment:
         )
     table = np.array(rows)
     psi = np.abs(table[:, 3]).max()
-    found.append(
-        Finding("i_d from -5 to 5 A: worst error of psi_m, with the term of L_d*i_d", None, psi, "%", psi < 3)
-    )
+    found.append(Finding("i_d from -5 to 5 A: worst error of psi_m, with the term of L_d*i_d", None, psi, "%", psi < 3))
     return Experiment("Any i_d, surface and interior magnets", found, {"table": table})
 
 
 def both_papers() -> Experiment:
     """Paper 001's flux under rated load with 2 us of dead time and a hot winding, without and with paper 000."""
-    machine = dataclasses.replace(
-        flux_bench.DRIVE.machine, resistance_temp_coeff_per_k=0.0039, temperature_ref_c=20.0
-    )
+    machine = dataclasses.replace(flux_bench.DRIVE.machine, resistance_temp_coeff_per_k=0.0039, temperature_ref_c=20.0)
     drive = dataclasses.replace(flux_bench.DRIVE, machine=machine)
     hot = dataclasses.replace(Machine.from_mapping(vars(machine)), temperature_winding_c=80.0)
     own = registers(drive)
@@ -86,9 +82,7 @@ def both_papers() -> Experiment:
             view = vsi_bench.trace(simulate(drive, register_set, scene, hot, **options), drive)
             z = last(0.5)
             pairs = ((view.estimate_d, view.lambda_d), (view.estimate_q, view.lambda_q))
-            errors[name] = (
-                100 * float(np.hypot(*(np.mean(a[z] - b[z]) for a, b in pairs))) / flux_bench.LAMBDA_N
-            )
+            errors[name] = 100 * float(np.hypot(*(np.mean(a[z] - b[z]) for a, b in pairs))) / flux_bench.LAMBDA_N
         rows.append((rpm, errors["without"], errors["with"]))
         ratio = errors["without"] / errors["with"]
         found += [
@@ -99,9 +93,7 @@ def both_papers() -> Experiment:
                 "% of lambda_n",
                 True,
             ),
-            Finding(
-                "Both papers: the same with V_dead and R(T)", None, errors["with"], "% of lambda_n", True
-            ),
+            Finding("Both papers: the same with V_dead and R(T)", None, errors["with"], "% of lambda_n", True),
             Finding(f"Both papers: times less at {rpm} rpm", None, ratio, "times", ratio > 5),
         ]
     return Experiment("Both papers together", found, {"table": np.array(rows)})

@@ -65,10 +65,7 @@ def fig_1_table_i() -> Experiment:
     wrong = []
     for row, signs in enumerate(TABLE_I):
         at = slice(60 * row, 60 * row + 60)
-        if any(
-            np.abs(x - t).max() > 1e-9
-            for x, t in zip(eq_5(theta[at], signs), (y[at] for y in table), strict=True)
-        ):
+        if any(np.abs(x - t).max() > 1e-9 for x, t in zip(eq_5(theta[at], signs), (y[at] for y in table), strict=True)):
             wrong.append(row)
             swapped = (signs[0], signs[2], signs[1])
             fits = zip(eq_5(theta[at], swapped), (y[at] for y in table), strict=True)
@@ -111,9 +108,7 @@ def fig_1_table_i() -> Experiment:
         spectrum = {k: harmonic(signal, view.theta[z], k) for k in range(1, 13)}
         top = max(spectrum, key=spectrum.get)
         found.append(Finding(f"Fig. 1: largest harmonic of {name}", 6, top, "order", top == 6))
-    return Experiment(
-        "Fig. 1, Table I: the direction functions", found, {"view": view, "table": (theta_e, *table)}
-    )
+    return Experiment("Fig. 1, Table I: the direction functions", found, {"view": view, "table": (theta_e, *table)})
 
 
 def fig_5() -> Experiment:
@@ -167,9 +162,7 @@ def figs_6_7_8() -> Experiment:
     def alpha(view: Run) -> np.ndarray:
         return (view.i_d * np.cos(view.theta) - view.i_q * np.sin(view.theta))[z]
 
-    rows = [
-        (f"6th of i_{x}", [harmonic(getattr(v, f"i_{x}")[z], v.theta[z], 6) for v in (off, on)]) for x in "dq"
-    ]
+    rows = [(f"6th of i_{x}", [harmonic(getattr(v, f"i_{x}")[z], v.theta[z], 6) for v in (off, on)]) for x in "dq"]
     rows += [(f"{k}th of i_alpha", [harmonic(alpha(v), v.theta[z], k) for v in (off, on)]) for k in (5, 7)]
     for name, (raw, clean) in rows:
         found.append(Finding(f"Figs. 6-8: {name} without compensation", None, 1e3 * raw, "mA", raw > 0.01))
@@ -228,12 +221,8 @@ def fig_11() -> Experiment:
                 "mWb",
                 True,
             ),
-            Finding(
-                f"Fig. 11: psi_m at {rpm} rpm without", wanted[1], raw, "mWb", abs(raw / by_loss - 1) < 0.03
-            ),
-            Finding(
-                f"Fig. 11: the plant's flux plus 4/pi*loss/omega at {rpm} rpm", None, by_loss, "mWb", True
-            ),
+            Finding(f"Fig. 11: psi_m at {rpm} rpm without", wanted[1], raw, "mWb", abs(raw / by_loss - 1) < 0.03),
+            Finding(f"Fig. 11: the plant's flux plus 4/pi*loss/omega at {rpm} rpm", None, by_loss, "mWb", True),
         ]
     ratio = extra[150] / extra[300]
     found.append(
@@ -254,9 +243,7 @@ def figs_12_13() -> Experiment:
     state = learnt(300).result.state
     for winding, magnets in ((25, 25), (60, 35), (95, 60), (90, 75), (70, 80), (45, 60), (25, 30)):
         machine = dataclasses.replace(MACHINE, temperature_winding_c=winding, temperature_magnet_c=magnets)
-        scene = dataclasses.replace(
-            held_at(300, 0.0, I_Q, 2.0), temp_winding=np.full(round(2.0 / T_S), float(winding))
-        )
+        scene = dataclasses.replace(held_at(300, 0.0, I_Q, 2.0), temp_winding=np.full(round(2.0 / T_S), float(winding)))
         view = run(scene, scaled(NOMINAL, FAST), machine, state=state)
         lost = run(held_at(300, 0.0, I_Q, 2.0), scaled(NOMINAL, FAST), machine, state=state)
         state, z = view.result.state, last(0.5)
@@ -280,9 +267,7 @@ def figs_12_13() -> Experiment:
             off < 0.5,
         )
     )
-    found.append(
-        Finding("Figs. 12, 13: the same without the thermocouple, R = R_0", None, blind, "%", blind > off)
-    )
+    found.append(Finding("Figs. 12, 13: the same without the thermocouple, R = R_0", None, blind, "%", blind > off))
     return Experiment("Figs. 12, 13: resistance and magnets over temperature", found, {"points": table})
 
 

@@ -60,9 +60,7 @@ def figs_16_17(e: Experiment) -> dict[str, Figure]:
     figure, axis = _axes()
     for (name, view), colour in zip(e.traces.items(), (QUIET, SPEED), strict=True):
         part = slice(-2000, None)
-        axis.plot(
-            view.ms[part] - view.ms[part][0], view.rpm[part], color=colour, label=f"{name} compensation"
-        )
+        axis.plot(view.ms[part] - view.ms[part][0], view.rpm[part], color=colour, label=f"{name} compensation")
     axis.set(title="Fig. 16: speed of a free shaft", ylabel="rpm", xlabel="time [ms]")
     _legend(axis)
     return {"speed": figure}

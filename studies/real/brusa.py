@@ -30,9 +30,7 @@ from studies.real.outputs import NAMES_OF_AXES, write
 FILE = Path("brusa_flux_map") / "brusa_meas.csv"
 DRIVE = ROOT / "docs" / "drives" / "brusa_hsm1.toml"
 # The switching plant follows the compare values without dead time; the drive file must describe the same plant.
-IDEAL = (
-    "\n[plant.inverter]\ndead_time_s = 0.0 # the closed loop over the measured map has an ideal inverter\n"
-)
+IDEAL = "\n[plant.inverter]\ndead_time_s = 0.0 # the closed loop over the measured map has an ideal inverter\n"
 EDGE_A, NAMING_STEP_A, MAPPING_STEP_A = 140.0, 35.0, 20.0
 NAMING = ((1000.0, 1), (-1800.0, 2))  # rpm, seed of the order, which decorrelates drift and current
 MAPPING_RPM, DWELL_S = 1000.0, 0.046
@@ -150,16 +148,13 @@ def _tell(answer, surface, found, beside, view, held, noise_v) -> None:
     edge = np.abs(surface.points.imag).max()
     on_axis = surface.psi(np.array([0.0, 1j * edge, -1j * edge]))
     share = 1.0 - (
-        np.mean(np.abs(surface.residual(view)[held]) ** 2)
-        / np.mean(np.abs(misfit(view)["u"].mean(axis=1)[held]) ** 2)
+        np.mean(np.abs(surface.residual(view)[held]) ** 2) / np.mean(np.abs(misfit(view)["u"].mean(axis=1)[held]) ** 2)
     )
     sigma = surface.error_wb
     machine = view.machine
     own = {
         "saturation": {
-            "psi_q_change_at_edge_wb": Estimate(
-                float(on_axis[1].imag - machine.inductance_q_h * edge), sigma, "Wb"
-            ),
+            "psi_q_change_at_edge_wb": Estimate(float(on_axis[1].imag - machine.inductance_q_h * edge), sigma, "Wb"),
         },
         "cross_saturation": {
             "psi_d_change_by_i_q_wb": Estimate(float(on_axis[1:].real.mean() - on_axis[0].real), sigma, "Wb"),
@@ -167,9 +162,7 @@ def _tell(answer, surface, found, beside, view, held, noise_v) -> None:
     }
     kept = [e for e in answer.effects if beside.get(e.name, 0.0) >= EARNS and e.name not in own]
     answer.effects = [
-        NamedEffect(
-            n, 0.999, own[n], float(share), {"machine.flux_map": chart.mended()} if n == found[0] else {}
-        )
+        NamedEffect(n, 0.999, own[n], float(share), {"machine.flux_map": chart.mended()} if n == found[0] else {})
         for n in found
     ] + kept
     answer.ambiguity = [g for g in answer.ambiguity if sum(beside.get(n, EARNS) >= EARNS for n in g) > 1]

@@ -127,8 +127,6 @@ def _cannot_tell(view, nominal, best, if_added, alone, at_rest) -> list[str]:
         if "parameters" in if_added.get(name, {}):
             value, sigma, unit = if_added[name]["parameters"][parameter]
             said.append(f"{name} would be {value:.3g} +- {sigma:.1g} {unit} in addition: not needed, not excluded.")
-    said.append(
-        "A current scale or bus gain error above 10 % was taken as improbable: either would rescale all else."
-    )
+    said.append("A current scale or bus gain error above 10 % was taken as improbable: either would rescale all else.")
     said.append("Winding and magnets warmed by 12 K only: temperature coefficients cannot be determined.")
     return said

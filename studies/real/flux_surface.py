@@ -78,10 +78,7 @@ class Surface:
 
     def residual(self, view) -> np.ndarray:
         """Residual of each block's mean misfit, (b,) complex dq [V]."""
-        left = (
-            misfit(view)["u"].mean(axis=1)
-            - emf_columns(view, self.knots_d, self.knots_q) @ self.weights.ravel()
-        )
+        left = misfit(view)["u"].mean(axis=1) - emf_columns(view, self.knots_d, self.knots_q) @ self.weights.ravel()
         for name, found in self.beside.items():
             columns = CATALOGUE[name].core(view)
             left = left - sum(e.value * columns[key]["u"].mean(axis=1) for key, e in found.items())
@@ -116,9 +113,7 @@ def ladder(view, train, beside=None) -> dict[str, dict]:
     """
     rows = {"nominal": misfit(view)["u"].mean(axis=1)}
     rows |= {shape: flux_map(view, beside, train, shape).residual(view) for shape in SHAPES}
-    return {
-        shape: {"train": _rms(left[train]), "holdout": _rms(left[~train])} for shape, left in rows.items()
-    }
+    return {shape: {"train": _rms(left[train]), "holdout": _rms(left[~train])} for shape, left in rows.items()}
 
 
 def names(steps: dict[str, dict], noise_v: float) -> list[str]:

@@ -105,12 +105,7 @@ def _misfit(log, nominal, hold, line):
     """(misfit of u_q with the nominal model, with the improved one), each (n,) [V]."""
     m = nominal.machine
     before = log.u_q - m.resistance_ohm * log.i_q - m.pole_pairs * m.magnet_flux_wb * log.omega
-    after = (
-        log.u_q
-        - hold["resistance"] * log.i_q
-        - line["k_e"] * log.omega
-        - line["k_e_tau"] * log.slope(log.omega)
-    )
+    after = log.u_q - hold["resistance"] * log.i_q - line["k_e"] * log.omega - line["k_e_tau"] * log.slope(log.omega)
     return before, after - line["v_loss"] * np.tanh(log.i_q / q_axis.KNEE_A) - line["u_0"]
 
 

@@ -36,9 +36,7 @@ def measure() -> dict:
         "FLUXPROOF_TOP": str(RTL / "fluxproof.vhd"),
         "FLUXPROOF_DRIVE": str(ROOT / "docs" / "drives" / "paper001.toml"),
     }
-    folder = ghdl.run(
-        "fluxproof", "studies.timeline.dut_timeline", {"CARRIER_HALF": 128}, environment, key="timeline"
-    )
+    folder = ghdl.run("fluxproof", "studies.timeline.dut_timeline", {"CARRIER_HALF": 128}, environment, key="timeline")
     problem = ghdl.failure(folder)
     if problem:
         raise RuntimeError(problem)
@@ -52,16 +50,12 @@ def draw(timeline: dict, path: Path) -> Path:
     for k, row in enumerate(rows):
         colour = COLOURS[BLOCKS[row["block"]].folder]
         axes.barh(k, row["last"] - row["first"], left=row["first"], color=colour, height=0.72)
-        axes.text(
-            row["last"] + 0.4, k, f"{row['first']} – {row['last']}", va="center", fontsize=8, color="#444"
-        )
+        axes.text(row["last"] + 0.4, k, f"{row['first']} – {row['last']}", va="center", fontsize=8, color="#444")
     axes.set_yticks(range(len(rows)), [row["block"] for row in rows], fontsize=9)
     axes.invert_yaxis()
     duty = timeline["sample_to_duty_clocks"]
     axes.axvline(duty, color="#b00", lw=1)
-    axes.text(
-        duty - 0.4, len(rows) - 0.4, f"duties after {duty} clocks", color="#b00", ha="right", fontsize=9
-    )
+    axes.text(duty - 0.4, len(rows) - 0.4, f"duties after {duty} clocks", color="#b00", ha="right", fontsize=9)
     axes.set_xlabel("clocks since the raw sample (5 ns each at 200 MHz)")
     axes.set_xlim(0, max(row["last"] for row in rows) + 5)
     axes.spines[["top", "right"]].set_visible(False)

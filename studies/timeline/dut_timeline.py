@@ -35,9 +35,7 @@ async def timeline(dut):
     await FallingEdge(dut.clk)
     strobes = {label: instance(dut.inside, label) for label in labels}
     strobes = {label: (h.in_valid, h.out_valid) for label, h in strobes.items() if hasattr(h, "in_valid")}
-    rows = {
-        label: {"block": labels[label], "instance": label, "first": None, "last": None} for label in strobes
-    }
+    rows = {label: {"block": labels[label], "instance": label, "first": None, "last": None} for label in strobes}
     duty = None
     dut.sample_valid.value = 1
     for clock in range(CLOCKS):
@@ -53,6 +51,4 @@ async def timeline(dut):
         await FallingEdge(dut.clk)
         dut.sample_valid.value = 0
     with open("timeline.json", "w") as stream:
-        json.dump(
-            {"sample_to_duty_clocks": duty, "blocks": sorted(rows.values(), key=lambda r: r["first"])}, stream
-        )
+        json.dump({"sample_to_duty_clocks": duty, "blocks": sorted(rows.values(), key=lambda r: r["first"])}, stream)

@@ -51,9 +51,7 @@ def test_the_rest_of_the_file_stays(path, tmp_path):
     nominal = load_nominal(path)
     assert improved_toml(nominal, []) == path.read_text()
     r = nominal.machine.resistance_ohm
-    found = effect(
-        {"machine.resistance_ohm": 1.1 * r}, "resistance", resistance_ohm=Estimate(1.1 * r, 1e-3, "ohm")
-    )
+    found = effect({"machine.resistance_ohm": 1.1 * r}, "resistance", resistance_ohm=Estimate(1.1 * r, 1e-3, "ohm"))
     before, after = path.read_text().splitlines(), improved_toml(nominal, [found]).splitlines()
     changed = [(a, b) for a, b in zip(before, after, strict=True) if a != b]
     assert len(changed) == 1
@@ -89,8 +87,7 @@ def test_trims_cancel_the_sensor_errors(reverse, tmp_path):
             r.offset_a, r.offset_b, r.offset_c, r.gain_a, r.gain_b, r.gain_c, 0, config.adc_bits,
         )  # fmt: skip
         wanted = [
-            x * (1.0 + error * g) + error * o
-            for x, g, o in zip(i, (0.02, 0, -0.03), (0.1, -0.05, 0.02), strict=True)
+            x * (1.0 + error * g) + error * o for x, g, o in zip(i, (0.02, 0, -0.03), (0.1, -0.05, 0.02), strict=True)
         ]
         np.testing.assert_allclose(np.array(seen[:3]) * amp, wanted, atol=6 * amp)
         u, _, _ = u_dc_conditioning.step(
@@ -148,9 +145,7 @@ def test_a_drive_without_the_core(tmp_path):
     nominal = load_nominal(path)
     found = [
         effect({"machine.resistance_ohm": 1.7, "inverter.dead_time_s": 2e-6}),
-        effect(
-            {"sensors.current_gain_error": [0.01, 0.0, 0.0], "machine.emf_harmonics": [[6, 0.01, 0.0, 0.0]]}
-        ),
+        effect({"sensors.current_gain_error": [0.01, 0.0, 0.0], "machine.emf_harmonics": [[6, 0.01, 0.0, 0.0]]}),
         effect(
             {
                 "sensors.current_gain_error": [0.02, 0.02, 0.02],
@@ -176,12 +171,8 @@ def test_a_drive_without_the_core(tmp_path):
 
 
 def test_an_improved_drive_can_be_improved(tmp_path):
-    first = write_improved(
-        load_nominal(PAPER), [effect({"machine.inductance_q_h": 0.4})], tmp_path / "a.toml"
-    )
-    second = write_improved(
-        load_nominal(first), [effect({"machine.inductance_q_h": 0.017})], tmp_path / "b.toml"
-    )
+    first = write_improved(load_nominal(PAPER), [effect({"machine.inductance_q_h": 0.4})], tmp_path / "a.toml")
+    second = write_improved(load_nominal(first), [effect({"machine.inductance_q_h": 0.017})], tmp_path / "b.toml")
     assert plant_of(second).machine.inductance_q_h == drives.load(second).machine.inductance_q_h == 0.017
 
 

@@ -47,12 +47,8 @@ def test_a_torque_that_drives_is_no_finding(tmp_path, nominal):
 
 
 def test_wrong_machine_data_are_no_swapped_phases(tmp_path, nominal):
-    machine = dataclasses.replace(
-        nominal.machine, resistance_ohm=4.0, magnet_flux_wb=0.12, inductance_q_h=0.03
-    )
-    recording = load_recording(
-        write(tmp_path / "r.parquet", made()), dataclasses.replace(nominal, machine=machine)
-    )
+    machine = dataclasses.replace(nominal.machine, resistance_ohm=4.0, magnet_flux_wb=0.12, inductance_q_h=0.03)
+    recording = load_recording(write(tmp_path / "r.parquet", made()), dataclasses.replace(nominal, machine=machine))
     assert codes(recording) == []
 
 

@@ -93,9 +93,7 @@ def test_runs_of_a_log_are_kept_apart(tmp_path, nominal):
 
 def test_the_inverter_data_set_is_refused_with_its_reason(tmp_path, nominal):
     names = (
-        [f"{s}_{x}_k{d}" for s in "i" for x in "abc" for d in ("", "-1")]
-        + [f"d_{x}_k-2" for x in "abc"]
-        + ["u_dc_k"]
+        [f"{s}_{x}_k{d}" for s in "i" for x in "abc" for d in ("", "-1")] + [f"d_{x}_k-2" for x in "abc"] + ["u_dc_k"]
     )
     with pytest.raises(RecordingError, match="missing the angle theta_e.*induction motor"):
         load_recording(write(tmp_path / "r.csv", {name: np.arange(500.0) for name in names}), nominal)

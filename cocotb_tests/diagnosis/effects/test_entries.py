@@ -48,9 +48,7 @@ def test_catalogue_entries_are_complete(name):
     assert effect.name == name and effect.title and effect.signature and effect.separated_by
     assert "=" in effect.equation
     assert effect.confounders and set(effect.confounders) <= set(CATALOGUE) - {name}
-    assert effect.parameters and all(
-        p.name.isidentifier() and p.unit and p.meaning for p in effect.parameters
-    )
+    assert effect.parameters and all(p.name.isidentifier() and p.unit and p.meaning for p in effect.parameters)
     assert np.isfinite(effect.floor(NOMINAL)) and effect.floor(NOMINAL) > 0.0
 
 
@@ -132,8 +130,6 @@ def test_a_new_file_is_a_new_effect(tmp_path, monkeypatch):
     finally:
         sys.modules.pop(f"{catalogue.__name__}.second_harmonic", None)
         vars(catalogue).pop("second_harmonic", None)
-    assert answer.verdict == "explained" and [e.name for e in answer.effects] == ["second_harmonic"], summary(
-        answer
-    )
+    assert answer.verdict == "explained" and [e.name for e in answer.effects] == ["second_harmonic"], summary(answer)
     # Equal a_d cos and a_q sin are one forward-rotating harmonic.
     assert answer.effects[0].parameters["order_2"].value == pytest.approx(0.01, rel=0.1)

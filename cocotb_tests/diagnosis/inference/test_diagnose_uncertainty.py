@@ -45,10 +45,7 @@ def test_a_delay_of_a_whole_period_is_found_without_bias(view):
     _, parameters = fitted(late, "delay")
     tau, sigma = parameters["delay"]["delay_s"].value, parameters["delay"]["delay_s"].sigma
     assert abs(tau - T) < 3.0 * sigma and abs(tau - T) < 2e-3 * T
-    further = (
-        CATALOGUE["delay"].corrected(late, {"tau": 1.1 * T}).u
-        - CATALOGUE["delay"].corrected(late, {"tau": T}).u
-    )
+    further = CATALOGUE["delay"].corrected(late, {"tau": 1.1 * T}).u - CATALOGUE["delay"].corrected(late, {"tau": T}).u
     assert np.abs(further[:, 1:]).max() > 0.0
 
 

@@ -216,9 +216,7 @@ def test_missing_columns_are_listed_with_those_found(tmp_path, nominal, gone, wo
 
 def test_paths_of_a_model_tree_count_by_their_last_part(tmp_path, nominal):
     table = made(600)
-    path = write(
-        tmp_path / "r.csv", {f"Model Root/Control/{name} [{COLUMNS[name]}]": v for name, v in table.items()}
-    )
+    path = write(tmp_path / "r.csv", {f"Model Root/Control/{name} [{COLUMNS[name]}]": v for name, v in table.items()})
     assert codes(load_recording(path, nominal)) == []
     twice = {"Left/i_a": table["i_a"]} | {f"Right/{name}": v for name, v in table.items()}
     with pytest.raises(RecordingError, match="'Left/i_a' and 'Right/i_a' could both be i_a"):

@@ -42,20 +42,14 @@ def recorded_drive(machine, inverter, sensors=None, seconds=1.2, noise=0.02):
     speeds = {0.0: 60, part: 700, 2 * part: -500, 3 * part: 1100}
     described = described_sensors(drive)
     sensors = dataclasses.replace(sensors or described, current_noise_a=noise)
-    plan = scenario(
-        drive, seconds, rpm={}, i_q=i_q, i_d={0.0: 0.0, part * 1.5: -2.0}, torque_mode=((0.0, 9.0),)
-    )
-    turning = (
-        np.convolve(np.pad(steps(len(plan), speeds, 1e-4), 200, "edge"), np.full(401, 1 / 401), "valid") * RPM
-    )
+    plan = scenario(drive, seconds, rpm={}, i_q=i_q, i_d={0.0: 0.0, part * 1.5: -2.0}, torque_mode=((0.0, 9.0),))
+    turning = np.convolve(np.pad(steps(len(plan), speeds, 1e-4), 200, "edge"), np.full(401, 1 / 401), "valid") * RPM
     plan = dataclasses.replace(plan, load=turning, omega_m=turning[0])
     samples, observed, _ = capture(drive, register_set, plan, machine, inverter, sensors, IMPOSED_SPEED)
     return samples, observed, drive, register_set
 
 
-LEGS = Inverter(
-    dead_time_s=2e-6, zero_current_a=0.1
-)  # as the nominal drive has it, and what a leg does near zero
+LEGS = Inverter(dead_time_s=2e-6, zero_current_a=0.1)  # as the nominal drive has it, and what a leg does near zero
 
 
 @pytest.fixture(scope="module")
@@ -99,9 +93,7 @@ def test_improved_drive_reproduces_the_recording(name, healthy, tmp_path):
     improved = write_improved(nominal, found, tmp_path / "improved.toml")
     data = closed_loop(from_columns(columns, 1e-4), nominal, improved)
     floor = closed_loop(own, nominal)["rms_before"]
-    before, after = (
-        np.hypot(data[run]["u_d_ref"], data[run]["u_q_ref"]) for run in ("rms_before", "rms_after")
-    )
+    before, after = (np.hypot(data[run]["u_d_ref"], data[run]["u_q_ref"]) for run in ("rms_before", "rms_after"))
     least = np.hypot(floor["u_d_ref"], floor["u_q_ref"])
     assert least < 2.0, "volts, on a drive of several hundred"
     # The core's own compensation of the dead time and its flux estimator answer to these two; the float loop has none.

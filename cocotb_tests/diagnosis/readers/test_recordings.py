@@ -24,20 +24,13 @@ def nominal(tmp_path_factory):
 @pytest.mark.parametrize("suffix", [".csv", ".txt", ".parquet", ".npz", ".npy", ".h5", ".mat", ".mf4", "7.3"])
 def test_every_format_comes_back_as_written(tmp_path, nominal, suffix):
     table = made()
-    path = (
-        write_mat73(tmp_path / "r.mat", table) if suffix == "7.3" else write(tmp_path / f"r{suffix}", table)
-    )
+    path = write_mat73(tmp_path / "r.mat", table) if suffix == "7.3" else write(tmp_path / f"r{suffix}", table)
     recording = load_recording(path, nominal)
     assert codes(recording) == []
     assert set(recording.columns) == set(table)
     for name, values in table.items():
         np.testing.assert_allclose(recording[name], values, rtol=1e-12, atol=1e-12)
-    assert (
-        recording.joined[:-1].all()
-        and not recording.joined[-1]
-        and recording.usable.all()
-        and not recording.slow
-    )
+    assert recording.joined[:-1].all() and not recording.joined[-1] and recording.usable.all() and not recording.slow
 
 
 UNITS = {
@@ -74,11 +67,7 @@ def test_text_layouts(tmp_path, nominal, separator, decimal, extra):
     text = as_text(table, separator, decimal, units=extra == "units", before=before)
     if extra == "quoted":
         head, rest = text.split("\n", 1)
-        text = (
-            separator.join(f'"{name}"' for name in table) + "\n" + rest
-            if separator.strip()
-            else head + "\n" + rest
-        )
+        text = separator.join(f'"{name}"' for name in table) + "\n" + rest if separator.strip() else head + "\n" + rest
     path = tmp_path / "r.csv"
     path.write_text(text)
     recording = load_recording(path, nominal)
@@ -139,9 +128,7 @@ def test_dspace_structures(tmp_path, nominal):
     from scipy.io import savemat
 
     table = made()
-    signals = [
-        {"Name": name, "Data": values, "Unit": COLUMNS[name]} for name, values in table.items() if name != "t"
-    ]
+    signals = [{"Name": name, "Data": values, "Unit": COLUMNS[name]} for name, values in table.items() if name != "t"]
     savemat(tmp_path / "r.mat", {"exp1": {"X": {"Name": "", "Data": table["t"]}, "Y": signals}})
     recording = load_recording(tmp_path / "r.mat", nominal)
     assert codes(recording) == []
@@ -165,9 +152,9 @@ def test_a_telemetry_dump_brings_its_registers(tmp_path):
     path, drive = dump(tmp_path / "core.dump")
     recording = load_recording(path, load_nominal(drive))
     assert not recording.problems and recording.has("i_a", "theta_e", "d_a", "u_dc", "i_q_ref")
-    assert {"registers", "samples", "observed"} <= set(recording.meta) and len(
-        recording.meta["samples"]
-    ) == len(recording)
+    assert {"registers", "samples", "observed"} <= set(recording.meta) and len(recording.meta["samples"]) == len(
+        recording
+    )
 
 
 @pytest.mark.study

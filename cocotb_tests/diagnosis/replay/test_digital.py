@@ -30,9 +30,7 @@ from golden_model.registers import registers
 from golden_model.units import from_si, to_si
 
 DRIVE = drives.load(PAPER)
-DRIVE = dataclasses.replace(
-    DRIVE, machine=dataclasses.replace(DRIVE.machine, resistance_temp_coeff_per_k=0.0039)
-)
+DRIVE = dataclasses.replace(DRIVE, machine=dataclasses.replace(DRIVE.machine, resistance_temp_coeff_per_k=0.0039))
 SET = registers(DRIVE)
 FIELDS = fluxproof.Observed._fields
 LIMITS = ("t_max", "i_max", "v_comp_max", "delta_max", "v_thr", "i_learn")
@@ -63,9 +61,7 @@ def dump(path, run, part=slice(None), names=FIELDS, **options):
 def replayed(samples, values=SET.values, state=None):
     """All outputs of the golden model, (n, 57), and its last state."""
     observed = np.zeros((len(samples), len(FIELDS)), np.int64)
-    state = run_controller(
-        state or fluxproof.State(), np.ascontiguousarray(samples), values, SET.config, observed
-    )
+    state = run_controller(state or fluxproof.State(), np.ascontiguousarray(samples), values, SET.config, observed)
     return observed, fluxproof.State(*state)
 
 
@@ -87,11 +83,7 @@ def test_dump_from_the_middle_of_a_run_with_its_state_has_no_difference(run, tmp
 def test_columns_equal_the_converter_values(run, tmp_path):
     samples, observed, _ = run
     columns, meta = telemetry.read_dump(dump(tmp_path / "a.dump", run))
-    assert (
-        telemetry.is_dump(tmp_path / "a.dump")
-        and not telemetry.is_dump(PAPER)
-        and not telemetry.is_dump(tmp_path)
-    )
+    assert telemetry.is_dump(tmp_path / "a.dump") and not telemetry.is_dump(PAPER) and not telemetry.is_dump(tmp_path)
     assert meta["registers"] == SET.values._asdict() and meta["start"] == "reset" and not meta["gaps"]
     for name in ("i_a", "i_b", "i_c", "u_dc"):
         lsb = to_si(name, 1, DRIVE)
@@ -104,9 +96,7 @@ def test_columns_equal_the_converter_values(run, tmp_path):
     assert columns["i_q_ref"][1475] == pytest.approx(-1.5, abs=1e-4)
     assert np.corrcoef(columns["omega_e"], np.gradient(np.unwrap(columns["theta_e"]), 1e-4))[0, 1] > 0.99
     # Without the core's speed: the angle's.
-    chord, _ = telemetry.read_dump(
-        dump(tmp_path / "b.dump", run, names=("compare_a", "compare_b", "compare_c"))
-    )
+    chord, _ = telemetry.read_dump(dump(tmp_path / "b.dump", run, names=("compare_a", "compare_b", "compare_c")))
     assert np.abs(chord["omega_e"] - columns["omega_e"]).mean() < 10.0
 
 
@@ -166,9 +156,7 @@ def test_flipped_output(signal, bit, block, row, run, tmp_path):
     found = got.first_difference
     assert (found["block"], found["sample"], found["signal"], found["bit"]) == (block, row, signal, bit)
     assert found["recorded"] == digital.hexadecimal(int(changed[signal][row]))
-    assert found["golden"] == digital.hexadecimal(int(observed[signal][row])) and found["differing"] == [
-        signal
-    ]
+    assert found["golden"] == digital.hexadecimal(int(observed[signal][row])) and found["differing"] == [signal]
     assert found["cause"]["kind"] == "record"
     assert found["golden_si"] == pytest.approx(to_si(signal, int(observed[signal][row]), DRIVE))
 
@@ -182,9 +170,7 @@ def test_a_flipped_raw_value(field, bit, block, run, tmp_path):
     changed, row = samples.copy(), 400
     changed[row, fluxproof.Sample._fields.index(field)] ^= 1 << bit
     wanted = first_row(replayed(samples)[0], replayed(changed)[0])
-    found = digital.replay(recording(dump(tmp_path / "a.dump", (changed, observed, last))))[
-        0
-    ].first_difference
+    found = digital.replay(recording(dump(tmp_path / "a.dump", (changed, observed, last))))[0].first_difference
     late = int(field == "i_d_ref")  # it acts a sample later, see current_limit
     assert found["sample"] == wanted == row + late and found["block"] == block
     cause = found["cause"]
@@ -195,9 +181,7 @@ def test_a_flipped_raw_value(field, bit, block, run, tmp_path):
         2500,
     )
     changed[row, 0] |= 1 << 20  # outside the converter's range
-    found = digital.replay(recording(dump(tmp_path / "a.dump", (changed, observed, last))))[
-        0
-    ].first_difference
+    found = digital.replay(recording(dump(tmp_path / "a.dump", (changed, observed, last))))[0].first_difference
     assert (found["block"], found["signal"], found["sample"]) == ("sample_latch", "adc_a", row)
 
 
@@ -301,9 +285,7 @@ def test_duties_alone_are_compared(run):
     found.meta["registers"] = found.meta["registers"] | {"kp_d": SET.values.kp_d ^ 32}
     assert digital.replay(found)[0].first_difference["block"] == "current_pi"
     for key in ("registers", "samples"):
-        got, notes = digital.replay(
-            dataclasses.replace(found, meta={k: v for k, v in found.meta.items() if k != key})
-        )
+        got, notes = digital.replay(dataclasses.replace(found, meta={k: v for k, v in found.meta.items() if k != key}))
         assert not got.checked and key in notes[0]
     assert not digital.replay(from_columns(columns, 1e-4))[0].checked
 

@@ -34,9 +34,7 @@ def psi_change(**changes):
     """(psi_d, psi_q) at rated i_q of a changed machine minus those of the nominal one [Wb]."""
     fluxes = []
     for machine in (dataclasses.replace(MACHINE, **changes), MACHINE):
-        fluxes.append(
-            np.array(flux_from_currents(machine_params(machine), MACHINE.magnet_flux_wb, 0.0, RATED))
-        )
+        fluxes.append(np.array(flux_from_currents(machine_params(machine), MACHINE.magnet_flux_wb, 0.0, RATED)))
     return fluxes[0] - fluxes[1]
 
 
@@ -121,9 +119,7 @@ def test_an_effect_outside_the_catalogue_is_unknown():
     assert "2 theta_e" in term.formula or "8 theta_m" in term.formula, term  # the same with four pole pairs
     # u = d psi / dt of psi = 0.01 psi_m exp(3 j theta_e) in the stator frame
     assert "c * omega *" in term.formula and term.unit == "V s/rad", term
-    assert term.value == pytest.approx(3 * 0.01 * 0.165, rel=0.1) and 0.0 < term.sigma < 0.05 * term.value, (
-        term
-    )
+    assert term.value == pytest.approx(3 * 0.01 * 0.165, rel=0.1) and 0.0 < term.sigma < 0.05 * term.value, term
     assert term.explains > 0.9, term
 
 

@@ -84,7 +84,7 @@ def test_sensors_that_bend_are_no_scale_and_no_saturation():
 
 def test_a_soft_shaft_is_no_inductance():
     table = dict(columns(GRID))
-    i_q = (table["i_a"] * -np.sin(table["theta_e"]) + (table["i_b"] - table["i_c"]) / 3**0.5 * np.cos(table["theta_e"]))
+    i_q = table["i_a"] * -np.sin(table["theta_e"]) + (table["i_b"] - table["i_c"]) / 3**0.5 * np.cos(table["theta_e"])
     smooth = np.convolve(np.pad(i_q, 20, mode="edge"), np.full(41, 1 / 41), "valid")
     table["theta_e"] = (table["theta_e"] + 0.05 * smooth / DRIVE.machine.rated_current_a) % (2 * np.pi)
     answer = answer_of(table)

@@ -40,9 +40,7 @@ def evidence(effect: float = 0.9, noise: float = 0.08, after: bool = True) -> Ev
     left = noise * noise_of(rng, len(omega))
     orders = np.array([0, 0.25, 0.5, 1, 2, 3, 4, 6, 12])
     arrays = dict(t=np.arange(len(omega)) * 0.01, theta_e=theta, omega_e=omega, i_d=i_d, i_q=i_q)
-    arrays |= dict(
-        before_d=before.real, before_q=before.imag, holdout=(np.arange(len(omega)) // 320) % 4 == 3
-    )
+    arrays |= dict(before_d=before.real, before_q=before.imag, holdout=(np.arange(len(omega)) // 320) % 4 == 3)
     arrays |= dict(noise=np.array(noise))
     arrays |= dict(orders=orders, spectrum_before=effect * np.array([1.27, *6 * [0.0], 0.25, 0.09]) + 0.003)
     if after:
@@ -96,18 +94,12 @@ SATURATION = NamedEffect(
     {"machine.inductance_q_h": 0.0151, "machine.flux_map": FLUX_MAP},
 )
 ASKED = [
-    Request(
-        314.0, -2.0, 0.0, ["encoder_offset", "inductance_q"], "an offset stays on d at i_q = 0, L_q does not"
-    ),
+    Request(314.0, -2.0, 0.0, ["encoder_offset", "inductance_q"], "an offset stays on d at i_q = 0, L_q does not"),
     Request(-314.0, -2.0, 0.0, ["encoder_offset"], "the offset's voltage turns with the speed", 563.0, 80.0),
 ]
-UNKNOWN = result.UnknownTerm(
-    "u_d", "c * omega_e * abs(i_q) * cos(2*theta_e)", 2.31e-3, 4e-5, "V s/(rad A)", 0.88
-)
+UNKNOWN = result.UnknownTerm("u_d", "c * omega_e * abs(i_q) * cos(2*theta_e)", 2.31e-3, 4e-5, "V s/(rad A)", 0.88)
 PROBLEMS = [
-    Problem(
-        "gap", "three samples are missing after 1.2044 s", "t", 12044, 3, "the balance is not taken across it"
-    ),
+    Problem("gap", "three samples are missing after 1.2044 s", "t", 12044, 3, "the balance is not taken across it"),
     Problem(
         "clipped",
         "the current stays at its largest value, 8.19 A",
@@ -118,9 +110,7 @@ PROBLEMS = [
     ),
 ]
 FATAL = [
-    Problem(
-        "current_sum", "the phase currents sum to 3.9 A rms, 0.1 A was expected", "i_c", 0, 200000, fatal=True
-    ),
+    Problem("current_sum", "the phase currents sum to 3.9 A rms, 0.1 A was expected", "i_c", 0, 200000, fatal=True),
     *PROBLEMS,
 ]
 DIFFERENCE = dict(block="current_pi", sample=4711, signal="u_q", bit=7, recorded="0x01A4", golden="0x0124")

@@ -115,9 +115,7 @@ class Bench:
                 for name in (n for n in now if now[n] != before[n]):
                     kind = MAP[name].kind
                     assert not (busy and kind is Kind.SETTING), f"{name} changed inside a sample"
-                    assert not (busy and kind is Kind.SAMPLE_PULSE and now[name]), (
-                        f"{name} rose inside a sample"
-                    )
+                    assert not (busy and kind is Kind.SAMPLE_PULSE and now[name]), f"{name} rose inside a sample"
             assert not (now["clear_trip"] and clear_trip_was), "clear_trip longer than a clock"
             if busy and not was_busy and taken:
                 assert rst or not now["clear_faults"], "clear_faults stayed although a sample took it"

@@ -89,7 +89,5 @@ def recorded(plan=GRID, machine=None, inverter=None, sensors=None, dead_time_s=0
 def dumped(plan=GRID, machine=None):
     """(samples, observed) of the averaged plant for a telemetry dump."""
     changed = dataclasses.replace(MACHINE, **(machine or {}))
-    samples, observed, _ = capture(
-        DRIVE, SET, scenario(plan), machine=changed, sensors=SENSORS, mode=IMPOSED_SPEED
-    )
+    samples, observed, _ = capture(DRIVE, SET, scenario(plan), machine=changed, sensors=SENSORS, mode=IMPOSED_SPEED)
     return samples, observed

@@ -27,9 +27,7 @@ def nominal_of(folder, columns: str = ""):
     return load_nominal(path)
 
 
-def made(
-    n=4000, speed=400.0, noise=0.004, offset=0.0, gain=(1.0, 1.0, 1.0), encoder=0.0, u_dc_gain=1.0, seed=1
-):
+def made(n=4000, speed=400.0, noise=0.004, offset=0.0, gain=(1.0, 1.0, 1.0), encoder=0.0, u_dc_gain=1.0, seed=1):
     """Canonical columns {name: (n,)} of the nominal machine at a rising speed with steps of current.
 
     offset [A] and gain: of the current sensors; encoder [rad]; u_dc_gain: of the bus sensor.
@@ -69,9 +67,7 @@ def dq_made(n=2000, step=0.01, seed=2):
     table["u_d_ref"] = R * i_d - omega * L_Q * i_q
     table["u_q_ref"] = R * i_q + omega * (L_D * i_d + PSI)
     table["u_dc"] = np.full(n, U_DC)
-    return {
-        name: v + (0.0 if name in ("t", "u_dc") else 0.01 * rng.normal(size=n)) for name, v in table.items()
-    }
+    return {name: v + (0.0 if name in ("t", "u_dc") else 0.01 * rng.normal(size=n)) for name, v in table.items()}
 
 
 def write(path, table, units=None, **options):
@@ -85,9 +81,7 @@ def write(path, table, units=None, **options):
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        fields = [
-            pa.field(n, pa.float64(), metadata={"unit": units[n]} if n in units else None) for n in table
-        ]
+        fields = [pa.field(n, pa.float64(), metadata={"unit": units[n]} if n in units else None) for n in table]
         pq.write_table(pa.table([pa.array(v) for v in table.values()], schema=pa.schema(fields)), path)
     elif suffix == ".npz":
         np.savez_compressed(path, **table)
@@ -98,9 +92,7 @@ def write(path, table, units=None, **options):
 
         with h5py.File(path, "w") as file:
             for name, values in table.items():
-                file.create_dataset(f"run/{name}", data=values, compression="gzip").attrs["unit"] = units.get(
-                    name, ""
-                )
+                file.create_dataset(f"run/{name}", data=values, compression="gzip").attrs["unit"] = units.get(name, "")
     elif suffix == ".mat":
         from scipy.io import savemat
 

@@ -72,6 +72,4 @@ def log(truth: Truth = Truth(), levels=LEVELS, hold_s=HOLD_S, seed=0) -> Recordi
     columns["u_q_ref"] = sent(u.imag, "u", truth.noise_v, 0.07)
     columns["omega_e"] = sent(speed, "omega", 0.02, 0.11)
     n = len(t)
-    return Recording(
-        "made-up CAN log", columns, np.ones(n, bool), np.append(np.ones(n - 1, bool), False), slow=True
-    )
+    return Recording("made-up CAN log", columns, np.ones(n, bool), np.append(np.ones(n - 1, bool), False), slow=True)

@@ -57,9 +57,7 @@ def _cut_and_flipped(add, whole) -> None:
         tail = "." + suffix.split(".")[-1]
         n = len(content)
         binary = suffix != ".csv"
-        for k, at in enumerate(
-            [1, 7, 8, 63, 127, 128, 300, 600, n // 4, n // 2, 3 * n // 4, n - 200, n - 9, n - 1]
-        ):
+        for k, at in enumerate([1, 7, 8, 63, 127, 128, 300, 600, n // 4, n // 2, 3 * n // 4, n - 200, n - 9, n - 1]):
             # What is cut in its first half holds too few rows at best.
             add(f"cut{k}_{suffix[:2]}{tail}", content[:at], REFUSED if at < 600 else EITHER)
         for k in range(10):
@@ -132,9 +130,7 @@ def _texts(add) -> None:
     add("quotes.csv", header + "\n" + '"' * 4001 + "\n", REFUSED)
     add("one_line.csv", "1,2,3," * 100_000, REFUSED)
     add("one_wide_line.csv", header + "\n" + "1," * 60_000 + "\n", REFUSED)
-    add(
-        "wide.csv", ",".join(f"c{k}" for k in range(6000)) + "\n" + (",".join("1" * 6000) + "\n") * 3, REFUSED
-    )
+    add("wide.csv", ",".join(f"c{k}" for k in range(6000)) + "\n" + (",".join("1" * 6000) + "\n") * 3, REFUSED)
     add("formulas.csv", header + "\n" + '=HYPERLINK("x"),@SUM(A1),+cmd|1,-2,0,0,0,0,0,0\n' * 500, REFUSED)
     add("escape.csv", "t,\x1b[2Ji_a\x07,i_b\n" + "0,1,2\n" * 500, REFUSED)
     add("newline_name.csv", 't,"i\n_a",i_b\n' + "0,1,2\n" * 500, REFUSED)
@@ -239,8 +235,7 @@ def _hostile(add, folder, files) -> None:
     add("footer0.parquet", b"PAR1" + bytes(100) + struct.pack("<I", 0) + b"PAR1", REFUSED)
     add(
         "ring.mf4",
-        b"MDF     4.10    test    ".ljust(64, b"\0")
-        + (b"##HD" + bytes(4) + struct.pack("<QQ", 104, 6) + b"@" * 88),
+        b"MDF     4.10    test    ".ljust(64, b"\0") + (b"##HD" + bytes(4) + struct.pack("<QQ", 104, 6) + b"@" * 88),
         REFUSED,
     )
     for name, make in {
@@ -299,7 +294,5 @@ def _hostile_hdf5(h5py, add, folder, files) -> None:
     make("round.h5", lambda f: f.__setitem__("again", f["/"]), EITHER)
     with h5py.File(folder / "none.h5", "w"):
         files["none.h5"] = folder / "none.h5", REFUSED
-    content = make(
-        "link_in.h5", lambda f: f.__setitem__("i_a", h5py.ExternalLink(str(other), "i_a"))
-    ).read_bytes()
+    content = make("link_in.h5", lambda f: f.__setitem__("i_a", h5py.ExternalLink(str(other), "i_a"))).read_bytes()
     add("link.mat", b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(384) + content, REFUSED)

@@ -42,9 +42,7 @@ def tool(name: str) -> str:
 
 def tcl_calls(script: str, folder: Path) -> list[str]:
     """The arguments of every call of ``keep`` in a script of Tcl, in order."""
-    keep = (
-        "proc keep {word} {set codes {}\nforeach c [split $word {}] {lappend codes [scan $c %c]}\nputs \"=$codes\"}\n"
-    )
+    keep = 'proc keep {word} {set codes {}\nforeach c [split $word {}] {lappend codes [scan $c %c]}\nputs "=$codes"}\n'
     path = folder / "script.tcl"
     path.write_bytes((keep + script).encode("ascii"))
     done = subprocess.run([tool("tclsh"), path], capture_output=True, text=True, cwd=folder)

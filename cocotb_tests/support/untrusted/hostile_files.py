@@ -27,7 +27,7 @@ def refused(path, *parts):
 
 def planting(marker: Path, variable: str) -> str:
     """A formula that passes numexpr's filter, which leaves out quoted text, and makes the file ``marker``."""
-    return f"{variable}+len(f'{{(lambda:open(\"{marker}\",\"w\").close())()}}')*0"
+    return f'{variable}+len(f\'{{(lambda:open("{marker}","w").close())()}}\')*0'
 
 
 def mdf(path: Path, conversion, *, on="u_dc", version="4.10", **more):

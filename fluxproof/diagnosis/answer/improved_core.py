@@ -121,9 +121,7 @@ def _wanted(nominal: Nominal, found: dict):
     """The changes of the core's keys that follow from the plant's keys."""
     for name, (value, effects) in found.items():
         section, key = name.split(".", 1)
-        fields = (
-            {f.name: f for f in dataclasses.fields(drives.SECTIONS[section])} if section in DESCRIBED else {}
-        )
+        fields = {f.name: f for f in dataclasses.fields(drives.SECTIONS[section])} if section in DESCRIBED else {}
         if key in fields and name not in ORDERS:
             yield Change(section, key, _within(key_of(fields[key]), value), " and ".join(effects))
     yield from _trims(nominal, found)
@@ -133,9 +131,7 @@ def _wanted(nominal: Nominal, found: dict):
         given = nominal.control.v_dead_limit_v
         limit = LOSS_MARGIN * usual + LOSS_SPARE_V if given is None else given
         if LOSS_MARGIN * loss + LOSS_SPARE_V > limit:
-            why = " and ".join(
-                dict.fromkeys(n for k in LOSSES for n in found.get(f"inverter.{k}", (0, ()))[1])
-            )
+            why = " and ".join(dict.fromkeys(n for k in LOSSES for n in found.get(f"inverter.{k}", (0, ()))[1]))
             yield Change("control", "v_dead_limit_v", LOSS_MARGIN * loss + LOSS_SPARE_V, why)
     if "timing.delay_s" in found:
         late, effects = found["timing.delay_s"]
@@ -172,9 +168,7 @@ def _trims(nominal: Nominal, found: dict):
         yield Change("sensors", "u_dc_gain", s.u_dc_gain / (1.0 + gain), why)
     turned, why = error("position_offset_rad")
     if turned is not None and s.position_bits is not None:
-        yield Change(
-            "sensors", "theta_offset_rad", s.theta_offset_rad - nominal.machine.pole_pairs * turned, why
-        )
+        yield Change("sensors", "theta_offset_rad", s.theta_offset_rad - nominal.machine.pole_pairs * turned, why)
 
 
 def nominal_loss_v(nominal: Nominal) -> float:

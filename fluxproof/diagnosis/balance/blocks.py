@@ -36,9 +36,7 @@ MOST_DECIMALS = 6  # with which a file writes currents
 def smooth(values, joined_run, half=HALF_WIDTH):
     """Moving average over 2 half + 1 samples, within runs of joined samples; nan at their ends."""
     width = 2 * half + 1
-    sums = np.cumsum(
-        np.concatenate([[0], np.nan_to_num(values)])
-    )  # a run ends at NaN
+    sums = np.cumsum(np.concatenate([[0], np.nan_to_num(values)]))  # a run ends at NaN
     out = np.full(len(values), np.nan, values.dtype)
     if len(values) >= width:
         out[half : len(values) - half] = (sums[width:] - sums[:-width]) / width

@@ -40,9 +40,7 @@ def shaft_kind(recording, nominal, i_s, theta, linked) -> str:
     torque = airgap(nominal, i_s)
     far = REACH * period
     omega_m, slope = np.full(len(theta), np.nan), np.full(len(theta), np.nan)
-    ahead, here, behind = (
-        theta[k : len(theta) - 2 * REACH + k] / m.pole_pairs for k in (2 * REACH, REACH, 0)
-    )
+    ahead, here, behind = (theta[k : len(theta) - 2 * REACH + k] / m.pole_pairs for k in (2 * REACH, REACH, 0))
     omega_m[REACH:-REACH] = (ahead - behind) / (2 * far)
     slope[REACH:-REACH] = (ahead - 2 * here + behind) / far**2
     inert = m.inertia_kgm2 * slope

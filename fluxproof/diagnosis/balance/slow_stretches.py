@@ -133,15 +133,11 @@ def stretches_of(recording, nominal, least_s) -> Stretches:
     before, behind = np.searchsorted(t, t - AROUND * window), np.searchsorted(t, t + (1.0 + AROUND) * window)
     while k < len(t) and behind[k] < len(t):
         inner, outer = slice(k, ends[k]), slice(before[k], behind[k])
-        whole = (
-            gaps[before[k]] == gaps[behind[k] - 1] and bad[behind[k]] == bad[before[k]] and ends[k] - k >= 3
-        )
+        whole = gaps[before[k]] == gaps[behind[k] - 1] and bad[behind[k]] == bad[before[k]] and ends[k] - k >= 3
         whole = whole and all(f[ends[k] - 1] > f[k] for f in fresh)
         resting = np.isfinite(angle[k]) and abs(omega[inner].mean()) * window < AT_REST
         whole = whole and (resting or np.abs(omega[inner]).min() * window > 2 * np.pi * turns)
-        if whole and all(
-            change(x[inner]) < limit and change(x[outer]) < LOOSE * limit for x in (nominal_u, u)
-        ):
+        if whole and all(change(x[inner]) < limit and change(x[outer]) < LOOSE * limit for x in (nominal_u, u)):
             found.append((k, ends[k], max(change(nominal_u[outer]), change(u[outer]))))
             k = ends[k]
         else:
@@ -207,9 +203,7 @@ def operating_columns(recording: Recording, nominal):
     """(i, u, omega, u_dc): dq current [A] and voltage [V] complex, speed [rad/s], bus [V], all (n,)."""
     r = recording
     if not r.has("omega_e"):
-        raise RecordingError(
-            f"{r.source}: a slow recording needs the speed omega_e: its angle is sampled too rarely"
-        )
+        raise RecordingError(f"{r.source}: a slow recording needs the speed omega_e: its angle is sampled too rarely")
     omega = r["omega_e"]
     u_dc = r["u_dc"] if r.has("u_dc") else np.full(len(r), float(nominal.inverter.dc_bus_v))
     turns = np.exp(2j * np.pi / 3 * np.arange(3))

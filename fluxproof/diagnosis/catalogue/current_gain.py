@@ -10,7 +10,7 @@ from fluxproof.diagnosis.ground.result import Estimate
 MOST_TURN = 1 / 3
 # Coefficients of gains of +1/2 and -1/2 of two sensors whose third current is computed, i_c = -i_a - i_b; the part of
 # the coefficients by which they may differ from that, and of its rotation, which three sensors do not have.
-PAIR = {"alpha": 1.5, "beta": -0.75**0.5, "turn": 12**-0.5}
+PAIR = {"alpha": 1.5, "beta": -(0.75**0.5), "turn": 12**-0.5}
 UNLIKE_PAIR, TURNED = 0.2, 0.5
 PATTERNS = {"alpha": (2 / 3, -1 / 3, -1 / 3), "beta": (0.0, 3**-0.5, -(3**-0.5))}
 

@@ -52,7 +52,5 @@ def _rows(recording) -> np.ndarray:
     """At most MOST_ROWS rows with the usual time step, spread over the recording."""
     step = np.diff(recording["t"])
     usual = np.median(step[step > 0]) if np.any(step > 0) else 0.0
-    rows = np.flatnonzero(
-        (step > 0.5 * usual) & (step < 1.5 * usual) & recording.usable[1:] & recording.usable[:-1]
-    )
+    rows = np.flatnonzero((step > 0.5 * usual) & (step < 1.5 * usual) & recording.usable[1:] & recording.usable[:-1])
     return rows[:: max(1, len(rows) // MOST_ROWS)]

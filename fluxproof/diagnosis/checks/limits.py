@@ -19,9 +19,7 @@ def check(recording, nominal) -> None:
             if duty.min() < 0.0 or duty.max() > 1.0:
                 out = (duty < -ROUNDING) | (duty > 1.0 + ROUNDING)
                 recording.columns[name] = np.clip(duty, 0.0, 1.0)
-                _set_aside(
-                    recording, out, "duty_range", name, "duties outside 0 to 1", "limited; rows not used"
-                )
+                _set_aside(recording, out, "duty_range", name, "duties outside 0 to 1", "limited; rows not used")
     if "u_dc" in recording.columns:
         u_dc, bus = recording["u_dc"], nominal.inverter.dc_bus_v
         out = (u_dc <= 0.02 * bus) | (u_dc > 20.0 * bus)
@@ -45,6 +43,4 @@ def _set_aside(recording, out, code, name, message, action) -> None:
     count = int(np.count_nonzero(out))
     if count:
         recording.usable &= ~out
-        recording.problems.append(
-            Problem(code, f"{count} {message}", name, int(np.argmax(out)), count, action)
-        )
+        recording.problems.append(Problem(code, f"{count} {message}", name, int(np.argmax(out)), count, action))

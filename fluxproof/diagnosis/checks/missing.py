@@ -35,13 +35,9 @@ def check(recording, nominal) -> None:
             elif name in PHASES and recording.has(*PHASES):
                 del columns[name]
                 action = "computed from the other two"
-                recording.problems.append(
-                    Problem("missing", "contains no finite number", name, row, bad, action)
-                )
+                recording.problems.append(Problem("missing", "contains no finite number", name, row, bad, action))
             else:
-                recording.problems.append(
-                    Problem("missing", "contains no finite number", name, row, bad, fatal=True)
-                )
+                recording.problems.append(Problem("missing", "contains no finite number", name, row, bad, fatal=True))
             continue
         if name not in SLOW and bad > MOST_MISSING * n:
             message = f"{bad} of {n} values are missing or not finite"

@@ -163,9 +163,7 @@ def _apply(recording, change, period) -> None:
     else:
         if "i_c" not in columns and what != "duties":
             columns["i_c"] = -columns["i_a"] - columns["i_b"]
-        for names in (
-            (CURRENTS, DUTIES) if what == "both" else (CURRENTS,) if what == "currents" else (DUTIES,)
-        ):
+        for names in (CURRENTS, DUTIES) if what == "both" else (CURRENTS,) if what == "currents" else (DUTIES,):
             values = [columns[names[k]] for k in ORDERS[which]]
             columns.update(zip(names, values, strict=True))
 

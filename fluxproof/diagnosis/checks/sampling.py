@@ -52,16 +52,12 @@ def check(recording, nominal) -> None:
         mark_points(recording, usual, period)
     elif ratio >= SLOW_FROM:
         recording.slow = True
-        message = (
-            f"a row every {usual:g} s, the control samples every {period:g} s: too slow for a row-to-row balance"
-        )
+        message = f"a row every {usual:g} s, the control samples every {period:g} s: too slow for a row-to-row balance"
         recording.problems.append(
             Problem("slow_sampling", message, "t", 0, len(recording), "only steady operating points are used")
         )
     elif not _time_is_wrong(recording, ratio, period):
-        message = (
-            f"a row every {usual:g} s, but [control] sample_time_s or 1 / pwm_frequency_hz is {period:g} s"
-        )
+        message = f"a row every {usual:g} s, but [control] sample_time_s or 1 / pwm_frequency_hz is {period:g} s"
         recording.problems.append(Problem("sample_time", message, "t", 0, len(recording), fatal=True))
         return
     else:

@@ -74,9 +74,7 @@ def _winding(recording) -> None:
 
 def _currents(recording, rated) -> None:
     large = {
-        name: size
-        for name in CURRENTS
-        if name in recording.columns and (size := _size(recording[name])) > MUCH * rated
+        name: size for name in CURRENTS if name in recording.columns and (size := _size(recording[name])) > MUCH * rated
     }
     if not large:
         return

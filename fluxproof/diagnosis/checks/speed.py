@@ -27,9 +27,7 @@ def check(recording, nominal) -> None:
     confirmed = rows is not None and not rows.steady and discriminates(rows) and misfit(rows) < 2 * FIT
     if abs(ratio + 1.0) <= LARGE:
         message, column = "speed and angle have opposite signs", "omega_e"
-        if (
-            rows is not None and rows.steady
-        ):  # dq values: the speed was checked against them, the angle cannot be
+        if rows is not None and rows.steady:  # dq values: the speed was checked against them, the angle cannot be
             column = "theta_e"
         recording.columns[column] = -recording[column]
         recording.problems.append(Problem("sign", message, column, 0, n, "corrected"))
@@ -40,7 +38,5 @@ def check(recording, nominal) -> None:
         message += ": omega_e is electrical; name its unit in [columns], or correct pole_pairs"
         recording.problems.append(Problem("angle_speed", message, "omega_e", 0, n, fatal=True))
         return
-    recording.problems.append(
-        Problem("angle_speed", message, "omega_e", 0, n, "the speed is scaled to the angle")
-    )
+    recording.problems.append(Problem("angle_speed", message, "omega_e", 0, n, "the speed is scaled to the angle"))
     recording.columns["omega_e"] = recording["omega_e"] * ratio

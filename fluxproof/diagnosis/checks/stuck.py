@@ -91,9 +91,7 @@ def _speed_left(recording, by_angle, a, b, period) -> bool:
         (by_angle[b] - by_angle[middle]) / (b - middle),
     )
     speed = recording["omega_e"][a] * period
-    return bool(
-        max(abs(first - speed), abs(second - speed)) * (b - a) > 3.0 and abs(first - second) * (b - a) > 1.0
-    )
+    return bool(max(abs(first - speed), abs(second - speed)) * (b - a) > 3.0 and abs(first - second) * (b - a) > 1.0)
 
 
 def _change(recording, names, a, b) -> float:

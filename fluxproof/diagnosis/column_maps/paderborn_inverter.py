@@ -20,6 +20,4 @@ COLUMNS = {
     "d_c_k-2": ("d_c", "1"),
 }
 SAMPLE_TIME_S = 1e-4
-NOTES = [
-    "the Paderborn inverter set is of an induction motor, its rows are in no order, and it has no rotor angle"
-]
+NOTES = ["the Paderborn inverter set is of an induction motor, its rows are in no order, and it has no rotor angle"]

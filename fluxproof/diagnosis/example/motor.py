@@ -24,9 +24,7 @@ RAMP, DWELL = 100, 450  # rows from one operating point to the next, and at it
 # Mechanical speeds [rad/s], each with currents i_d, i_q [A] in an order of its own, so that nothing follows the time.
 SPEEDS = (30.0, 150.0, -90.0)
 CURRENTS = ((0.0, 0.0), (0.0, 4.5), (-2.5, 2.0), (0.0, -4.5), (-2.5, -3.0), (2.0, 1.0))
-PLAN = tuple(
-    (speed, *point) for turn, speed in enumerate(SPEEDS) for point in CURRENTS[turn:] + CURRENTS[:turn]
-)
+PLAN = tuple((speed, *point) for turn, speed in enumerate(SPEEDS) for point in CURRENTS[turn:] + CURRENTS[:turn])
 
 
 class Hidden(NamedTuple):

@@ -111,9 +111,7 @@ def _fitted(u, e) -> tuple[float, float, float, float]:
 def _log_density(u, mu, v, epsilon):
     d2 = (u - mu) ** 2 / v
     common = -0.5 * np.log(2.0 * np.pi * v)
-    return common + np.logaddexp(
-        np.log1p(-epsilon) - 0.5 * d2, np.log(epsilon) - np.log(WIDE) - 0.5 * d2 / WIDE**2
-    )
+    return common + np.logaddexp(np.log1p(-epsilon) - 0.5 * d2, np.log(epsilon) - np.log(WIDE) - 0.5 * d2 / WIDE**2)
 
 
 def _inlier(u, mu, v, epsilon):

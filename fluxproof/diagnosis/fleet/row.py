@@ -25,7 +25,8 @@ def row_of(answer: Diagnosis) -> dict:
         "names": [{"effect": e.name, "confidence": e.confidence, "explains": e.explains} for e in answer.effects],
         "parameters": [
             {"effect": e.name, "parameter": key, **dataclasses.asdict(p)}
-            for e in answer.effects for key, p in e.parameters.items()
+            for e in answer.effects
+            for key, p in e.parameters.items()
         ],  # fmt: skip
         "ambiguity": answer.ambiguity,
         "explained_share": answer.explained_share,
@@ -79,7 +80,8 @@ def _hypotheses(answer) -> list[dict]:
             "credible": [of[n].confidence for n in extras],
             "estimates": [
                 {"effect": e.name, "parameter": key, **dataclasses.asdict(p)}
-                for e in answer.effects for key, p in e.parameters.items()
+                for e in answer.effects
+                for key, p in e.parameters.items()
             ],  # fmt: skip
             "left": [dataclasses.asdict(part) for part in answer.remainder],
             "left_share": None if answer.explained_share is None else 1.0 - answer.explained_share,

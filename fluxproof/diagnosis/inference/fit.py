@@ -106,9 +106,7 @@ class Fitter:
         """Indices of a model's columns, the cores first."""
         names = sorted(model.names)
         cores = [k for name in names for k in self.index[name][0]]
-        return np.array(
-            cores + [k for name in names if name in model.free for k in self.index[name][1]], np.int64
-        )
+        return np.array(cores + [k for name in names if name in model.free for k in self.index[name][1]], np.int64)
 
     def carried(self, model) -> np.ndarray:
         """Indices of a model's columns that the data determine.

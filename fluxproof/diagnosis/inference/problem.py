@@ -132,8 +132,10 @@ class Problem:
         # Prior odds of every effect, and the prior of its size: even in the logarithm up to a typical size, the
         # geometric mean of the smallest of interest and the largest possible one, and falling beyond.
         value += sum(
-            self.setup.odds(n) + self.setup.effects[n].log_choice(self.setup.view)
-            - np.log(np.log(self.most[n])) - np.log1p(x**2 / self.most[n])
+            self.setup.odds(n)
+            + self.setup.effects[n].log_choice(self.setup.view)
+            - np.log(np.log(self.most[n]))
+            - np.log1p(x**2 / self.most[n])
             for n, x in zip(names, a, strict=True)
         )
         found = Fit(self, names, float(value), take, c, cov, a, lam, mu)

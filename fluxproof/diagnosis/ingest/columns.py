@@ -115,9 +115,7 @@ def canonical(table: Table, plan: Plan) -> dict[str, np.ndarray]:
         if raw is not None and source.unit and source.column in table.meta.get("moments", ()):
             arrays[name] = raw  # in seconds, whatever the header says
         elif raw is not None:
-            arrays[name] = (
-                raw if source.factor == 1.0 and not source.offset else raw * source.factor + source.offset
-            )
+            arrays[name] = raw if source.factor == 1.0 and not source.offset else raw * source.factor + source.offset
     bus = arrays.get("u_dc", plan.assumed.get("u_dc"))
     for name in [name for name in arrays if plan.sources[name].bus and bus is not None]:
         arrays[name] = arrays[name] * bus
@@ -169,9 +167,7 @@ def _source(column, name, unit, nominal, where) -> Source:
         return Source(column, OF_BUS[unit], 0.0, unit, True, bus=True)
     found = conversion(name, unit, nominal.machine.pole_pairs)
     if found is None:
-        raise RecordingError(
-            f"{where}: unit {shown(unit)!r} is unknown for {name}; known are {known_units(name)}"
-        )
+        raise RecordingError(f"{where}: unit {shown(unit)!r} is unknown for {name}; known are {known_units(name)}")
     return Source(column, *found, unit, True)
 
 
@@ -198,11 +194,7 @@ def _ready_made(plan, left, nominal, path) -> bool:
         for column in left:
             keys.setdefault(key(split_unit(column)[0]), []).append(column)
         if known.SIGNATURE <= set(keys):
-            fits = {
-                k: c
-                for k, c in keys.items()
-                if k in known.COLUMNS and known.COLUMNS[k][0] not in plan.sources
-            }
+            fits = {k: c for k, c in keys.items() if k in known.COLUMNS and known.COLUMNS[k][0] not in plan.sources}
             if (len(known.SIGNATURE), len(fits)) > (len(best.SIGNATURE), len(hits)) if best else fits:
                 best, hits = known, fits
     if best is None or not hits:

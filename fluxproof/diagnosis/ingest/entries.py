@@ -17,26 +17,20 @@ def entry_of(key, value, nominal) -> dict:
     where = f"{nominal.path}: [columns] {shown(key)!r}"
     entry = {"name": value} if isinstance(value, str) else value
     if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
-        raise RecordingError(
-            f"{where}: must be a canonical name or a table such as {{name = 'i_a', unit = 'mA'}}"
-        )
+        raise RecordingError(f"{where}: must be a canonical name or a table such as {{name = 'i_a', unit = 'mA'}}")
     if entry["name"] and entry["name"] not in COLUMNS:
         raise RecordingError(
             f"{where}: {shown(entry['name'])!r} is not a canonical name{nearest(entry['name'], COLUMNS)}"
         )
     for name in entry:
         if name not in KEYS:
-            raise RecordingError(
-                f"{where}: unknown key {shown(name)!r}; known are name, unit, factor, offset"
-            )
+            raise RecordingError(f"{where}: unknown key {shown(name)!r}; known are name, unit, factor, offset")
     for name in ("factor", "offset"):
         if not is_finite(entry.get(name, 1.0)):
             raise RecordingError(f"{where}: {name} must be a finite number")
     if entry.get("factor") == 0:
         raise RecordingError(f"{where}: factor must not be 0")
-    if not isinstance(entry.get("unit", ""), str) or (
-        "unit" in entry and ("factor" in entry or "offset" in entry)
-    ):
+    if not isinstance(entry.get("unit", ""), str) or ("unit" in entry and ("factor" in entry or "offset" in entry)):
         raise RecordingError(f"{where}: give either unit, as a string, or factor and offset")
     return entry
 

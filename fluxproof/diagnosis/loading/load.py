@@ -71,9 +71,7 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
         raise RecordingError(f"{path}{line}: column {shown(column)!r} ({name}) contains no numbers")
     n = len(next(iter(columns.values())))
     notes = [*table.notes, *plan.notes]
-    notes += [
-        f"{name}: column {shown(column)!r} contains no numbers and is ignored" for name, column in text.items()
-    ]
+    notes += [f"{name}: column {shown(column)!r} contains no numbers and is ignored" for name, column in text.items()]
     meta = table.meta | {
         "notes": notes,
         "map": plan.used,
@@ -99,9 +97,7 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
         notes.append(f"no time column: rows are assumed to be {step:g} s apart")
     if plan.run and plan.run in table.columns:
         meta["run"] = table.columns[plan.run]
-    recording = Recording(
-        str(path), columns, np.ones(n, bool), np.append(np.ones(n - 1, bool), False), meta=meta
-    )
+    recording = Recording(str(path), columns, np.ones(n, bool), np.append(np.ones(n - 1, bool), False), meta=meta)
     recording.problems += [_renamed(problem, meta["columns"]) for problem in table.problems]
     return recording
 

@@ -48,9 +48,7 @@ def closed_loop(recording: Recording, nominal: Nominal, improved=None) -> dict:
     if improved is not None:
         drives["after"] = plant_of(improved if isinstance(improved, Nominal) else load_nominal(improved))
     for name, plant in drives.items():
-        made = [
-            _simulate(part, plant, nominal, recorded)[keep] for part, keep in zip(parts, shown, strict=True)
-        ]
+        made = [_simulate(part, plant, nominal, recorded)[keep] for part, keep in zip(parts, shown, strict=True)]
         result[f"simulated_{name}"] = _columns(made, block)
         result[f"rms_{name}"] = {
             signal: float(np.sqrt(np.nanmean((values - result["recorded"][signal]) ** 2)))
@@ -87,9 +85,7 @@ def _recorded(recording: Recording, nominal: Nominal) -> np.ndarray:
     elif recording.has("u_d_ref", "u_q_ref"):
         volts = np.stack([recording["u_d_ref"], recording["u_q_ref"]], axis=1)
     else:
-        raise RecordingError(
-            f"{recording.source}: d_a, d_b, d_c with u_dc and theta_e, or u_d_ref, u_q_ref are needed"
-        )
+        raise RecordingError(f"{recording.source}: d_a, d_b, d_c with u_dc and theta_e, or u_d_ref, u_q_ref are needed")
     return np.hstack([volts, currents])
 
 
@@ -109,7 +105,13 @@ def controller_of(nominal: Nominal) -> Controller:
         c = dataclasses.replace(c, current_bandwidth_hz=USUAL_BANDWIDTH / nominal.sample_time_s)
     (kp_d, ki_d), (kp_q, ki_q) = (current_gains(dataclasses.replace(nominal, control=c), x) for x in "dq")
     return Controller(
-        kp_d, kp_q, ki_d, ki_q, m.inductance_d_h, m.inductance_q_h, m.magnet_flux_wb,
+        kp_d,
+        kp_q,
+        ki_d,
+        ki_q,
+        m.inductance_d_h,
+        m.inductance_q_h,
+        m.magnet_flux_wb,
         float(c.delay_samples) - nominal.sampling.delay_s / nominal.sample_time_s,
     )
 
@@ -140,9 +142,7 @@ def _simulate(part: Stretch, plant: Plant, nominal: Nominal, recorded) -> np.nda
     if machine.flux_map is not None and machine.flux_map.folds():
         machine = dataclasses.replace(machine, flux_map=machine.flux_map.mended())
     # A sign function would make currents near zero chatter by the step of half a dead time.
-    ripple = (
-        0.5 * inverter.dead_time_s * part.u_dc.max() / min(machine.inductance_d_h, machine.inductance_q_h)
-    )
+    ripple = 0.5 * inverter.dead_time_s * part.u_dc.max() / min(machine.inductance_d_h, machine.inductance_q_h)
     inverter = dataclasses.replace(inverter, zero_current_a=max(inverter.zero_current_a, ripple))
     params = plant_params(machine, inverter, mode=IMPOSED_SPEED)
     first = recorded[part.rows[0]]
@@ -154,9 +154,7 @@ def _simulate(part: Stretch, plant: Plant, nominal: Nominal, recorded) -> np.nda
     )  # fmt: skip
     c, omega = controller, part.omega[0]
     u_d, u_q = first[:2] if np.isfinite(first[:2]).all() else (0.0, omega * c.magnet_flux)
-    integral = np.array(
-        [u_d + omega * c.inductance_q * i_q, u_q - omega * (c.inductance_d * i_d + c.magnet_flux)]
-    )
+    integral = np.array([u_d + omega * c.inductance_q * i_q, u_q - omega * (c.inductance_d * i_d + c.magnet_flux)])
     hot = np.where(np.isfinite(part.temperature), part.temperature, machine.temperature_winding_c)
     out = np.zeros((len(part.rows), 4))
     run_loop(

@@ -36,9 +36,7 @@ def dq_currents(recording: Recording) -> np.ndarray:
         return np.stack([recording["i_d"], recording["i_q"]], axis=1)
     if recording.has("i_a", "i_b", "i_c", "theta_e"):
         return dq(*(recording[f"i_{x}"] for x in "abc"), theta=recording["theta_e"])
-    raise RecordingError(
-        f"{recording.source}: i_d, i_q or i_a, i_b, i_c with theta_e are needed to simulate it"
-    )
+    raise RecordingError(f"{recording.source}: i_d, i_q or i_a, i_b, i_c with theta_e are needed to simulate it")
 
 
 def dq(a, b, c, theta) -> np.ndarray:
@@ -76,9 +74,7 @@ def _windows(recording):
     for start, stop in runs:
         count = max(1, (stop - start) // WINDOW_ROWS)
         edges = np.linspace(start, stop, count + 1).astype(int)
-        pieces += [
-            (int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True) if b - a >= LEAST_ROWS
-        ]
+        pieces += [(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True) if b - a >= LEAST_ROWS]
     pieces = [(a, b) for a, b in pieces if recording.usable[a:b].mean() > 0.9]
     keep = max(1, MOST_ROWS // WINDOW_ROWS)
     if sum(b - a for a, b in pieces) > MOST_ROWS:
@@ -118,35 +114,22 @@ def smooth(values: np.ndarray) -> np.ndarray:
 def _slow(recording, nominal, rows):
     """Bus voltage and temperature of rows."""
     count = len(rows)
-    u_dc = (
-        filled(recording["u_dc"][rows])
-        if recording.has("u_dc")
-        else np.full(count, nominal.inverter.dc_bus_v)
-    )
+    u_dc = filled(recording["u_dc"][rows]) if recording.has("u_dc") else np.full(count, nominal.inverter.dc_bus_v)
     hot = recording["temp_winding"][rows] if recording.has("temp_winding") else np.full(count, np.nan)
     return u_dc, hot
 
 
 def _points(recording, nominal, currents, t_s):
     """Operating points of a slow recording, each held until the current loop has settled."""
-    rows = np.flatnonzero(
-        recording.usable & np.isfinite(currents).all(axis=1) & np.isfinite(recording["omega_e"])
-    )
+    rows = np.flatnonzero(recording.usable & np.isfinite(currents).all(axis=1) & np.isfinite(recording["omega_e"]))
     if not len(rows):
         raise RecordingError(f"{recording.source}: no usable row to simulate")
-    rows = (
-        rows[np.unique(np.linspace(0, len(rows) - 1, MOST_ROWS // SETTLING_ROWS).astype(int))]
-        if len(rows)
-        else rows
-    )
+    rows = rows[np.unique(np.linspace(0, len(rows) - 1, MOST_ROWS // SETTLING_ROWS).astype(int))] if len(rows) else rows
     found = []
     for row in rows:
         at = np.full(SETTLING_ROWS, row)
         omega = recording["omega_e"][at]
         theta = np.concatenate(([0.0], np.cumsum(omega) * t_s))
-        refs = [
-            recording[n][at] if recording.has(n) else currents[at, k]
-            for k, n in enumerate(("i_d_ref", "i_q_ref"))
-        ]
+        refs = [recording[n][at] if recording.has(n) else currents[at, k] for k, n in enumerate(("i_d_ref", "i_q_ref"))]
         found.append(Stretch(at, theta, omega, np.stack(refs, axis=1), *_slow(recording, nominal, at)))
     return found

@@ -45,9 +45,7 @@ class Errors(NamedTuple):
 
 
 @njit
-def run_loop(
-    state, params, c, e, theta_read, theta_true, omega, i_ref, u_dc, temperature, integral, period_s, out
-):
+def run_loop(state, params, c, e, theta_read, theta_true, omega, i_ref, u_dc, temperature, integral, period_s, out):
     """Simulate n rows; ``out`` (n, 4) receives measured i_d, i_q [A] and commanded u_d, u_q [V].
 
     theta_read, theta_true (n + 1,): electrical angle, unwrapped [rad]; omega (n,) [rad/s]; i_ref (n, 2) [A];

@@ -90,4 +90,3 @@ def _slice(dataset, pick, limit) -> np.ndarray:
         return dataset[pick, :limit] if dataset.shape[0] < dataset.shape[1] else dataset[:limit, pick]
     axis = int(np.argmax(dataset.shape))
     return dataset[tuple(slice(limit) if k == axis else 0 for k in range(dataset.ndim))]
-

@@ -116,4 +116,3 @@ def _address(identifier) -> tuple:
 
     info = h5o.get_info(identifier)
     return info.fileno, info.addr
-

@@ -172,9 +172,7 @@ def _table(path, wanted, signals, units, limit) -> Table:
     table = Table(columns, {n: u for n, u in units.items() if u and n in columns} | {TIME: "s"}, text=text)
     if other:
         names = ", ".join(shown(name, 24) for name in other[:6]) + (", ..." if len(other) > 6 else "")
-        table.notes.append(
-            f"{names} are on other rasters; their last value is repeated on the raster of {shown(main)}"
-        )
+        table.notes.append(f"{names} are on other rasters; their last value is repeated on the raster of {shown(main)}")
     if len(raster) >= limit:
         table.problems.append(too_long(limit))
     return table

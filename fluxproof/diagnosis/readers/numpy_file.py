@@ -65,9 +65,7 @@ def _single(path, select) -> Table:
     if array.dtype.names:
         arrays = {name: array[name] for name in array.dtype.names if array.ndim == 1 and array[name].ndim == 1}
     elif array.ndim != 2:
-        raise RecordingError(
-            f"{path}: an array of {array.ndim} dimensions without names; a matrix is expected"
-        )
+        raise RecordingError(f"{path}: an array of {array.ndim} dimensions without names; a matrix is expected")
     else:
         array = array.T if array.shape[0] < array.shape[1] else array
         arrays = {str(k + 1): array[:, k] for k in range(min(array.shape[1], MAX_COLUMNS))}

@@ -84,9 +84,7 @@ def sniff(path) -> Layout:
     candidates = (_candidate(lines, separator, decimal) for separator in SEPARATORS for decimal in ".,")
     score, separator, decimal, first, width = max(candidates, key=lambda c: c[0])
     if score <= 0:
-        raise RecordingError(
-            f"{path}: no row of numbers in the first {len(lines)} lines; a table was expected"
-        )
+        raise RecordingError(f"{path}: no row of numbers in the first {len(lines)} lines; a table was expected")
     names, units = _header(lines[:first], separator, width)
     above = split(lines[first - 1], separator) if first else []
     if names[0] == "1" and len(above) > 2 and all(above) and separator != " ":
@@ -138,9 +136,7 @@ def _header(lines, separator, width):
     """(names, units) from the lines above the numbers; "1", "2", ... without a header."""
     rows = []
     for line in reversed(lines):
-        fields = split(
-            line.strip().lstrip("#%/").strip() if line.lstrip().startswith(COMMENT) else line, separator
-        )
+        fields = split(line.strip().lstrip("#%/").strip() if line.lstrip().startswith(COMMENT) else line, separator)
         if len(fields) == width - 1 and separator != " ":
             fields.append("")  # rows that end in a separator
         if len(fields) == width and any(fields):

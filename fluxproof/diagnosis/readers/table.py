@@ -117,9 +117,7 @@ def as_columns(arrays: dict[str, object], path) -> tuple[dict[str, np.ndarray], 
     wrong = {name: len(a) for name, a in flat.items() if len(a) not in (1, n)}
     if wrong:
         name, length = next(iter(wrong.items()))
-        raise RecordingError(
-            f"{path}: array {shown(name)} has {length} values, others {n}; one length is needed"
-        )
+        raise RecordingError(f"{path}: array {shown(name)} has {length} values, others {n}; one length is needed")
     limit = row_limit(len(flat))
     columns = {}
     for name, array in flat.items():

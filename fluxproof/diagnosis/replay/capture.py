@@ -62,9 +62,7 @@ def _capture(
         x[2] = current_code(sensors, 2, plant_state[L.I_C], k)
         x[3] = u_dc_code(sensors, u_dc[k], k)
         x[4] = position_code(sensors, plant_state[L.THETA_M], k)
-        sample = fluxproof.Sample(
-            x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12]
-        )
+        sample = fluxproof.Sample(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12])
         state, seen = fluxproof.step(state, sample, registers, config)
         for n, value in enumerate(seen):
             observed[k, n] = value

@@ -30,9 +30,7 @@ def run_until_different(state, samples, given, registers, config, recorded, colu
     """
     for k in range(start, stop):
         x = samples[k]
-        sample = fluxproof.Sample(
-            x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12]
-        )
+        sample = fluxproof.Sample(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12])
         of_speed = given_of(registers, given, k)
         following, out = fluxproof.step_given(state, sample, registers, config, of_speed)
         different = False
@@ -52,9 +50,7 @@ def count_differences(state, samples, given, registers, config, recorded, column
     count = 0
     for k in range(start, stop):
         x = samples[k]
-        sample = fluxproof.Sample(
-            x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12]
-        )
+        sample = fluxproof.Sample(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12])
         state, out = fluxproof.step_given(state, sample, registers, config, given_of(registers, given, k))
         for n, value in enumerate(out):
             if column[n] >= 0 and recorded[k, column[n]] != value:

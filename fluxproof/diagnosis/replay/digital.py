@@ -55,18 +55,14 @@ def replay(recording: Recording) -> tuple[Digital, list[str]]:
         ]
     lacking = [name for name in fluxproof.Registers._fields if name not in meta["registers"]]
     if lacking:
-        return Digital(), [
-            f"The digital part was not checked: register {lacking[0]} is not in the recording."
-        ]
+        return Digital(), [f"The digital part was not checked: register {lacking[0]} is not in the recording."]
     observed = meta.get("observed") or _duties(recording, meta["config"])
     if not observed:
         return Digital(), [
             "The digital part was not checked: the recording has no output of the core, not even duties."
         ]
     run = run_of(meta["samples"], observed, meta["registers"], meta["config"])
-    notes = [
-        f"The dump's header was changed after it was written: {what}." for what in meta.get("altered", [])
-    ]
+    notes = [f"The dump's header was changed after it was written: {what}." for what in meta.get("altered", [])]
     misfit = _not_of_its_format(run)
     if misfit is not None:
         return _result(run, recording, *misfit), notes
@@ -87,11 +83,7 @@ def _not_of_its_format(run: Run):
     for k, port in enumerate(sample_latch.BLOCK.outputs):
         name = fluxproof.Sample._fields[k]
         size = sample_latch.BLOCK.width_from.get(port.name)
-        fmt = (
-            size({"ADC_BITS": run.config.adc_bits, "POSITION_BITS": run.config.position_bits})
-            if size
-            else port.fmt
-        )
+        fmt = size({"ADC_BITS": run.config.adc_bits, "POSITION_BITS": run.config.position_bits}) if size else port.fmt
         wrong = np.flatnonzero((run.samples[:, k] < fmt.lo) | (run.samples[:, k] > fmt.hi))
         if len(wrong):
             row = int(wrong[0])
@@ -182,9 +174,7 @@ def _cause_mapping(cause: Cause, stop) -> dict:
 def _result(run, recording, row, instance, signal, golden, cause, names) -> Digital:
     """A difference in the form of diagnosis.json."""
     is_input = signal in fluxproof.Sample._fields
-    found = int(
-        run.samples[row, fluxproof.Sample._fields.index(signal)] if is_input else _recorded(run, row, signal)
-    )
+    found = int(run.samples[row, fluxproof.Sample._fields.index(signal)] if is_input else _recorded(run, row, signal))
     scale = recording.meta.get("scales", {}).get(signal, 1.0)
     physical = "code" if is_input else unit(signal)
     counter = recording.meta.get("counter")
@@ -207,9 +197,7 @@ def _result(run, recording, row, instance, signal, golden, cause, names) -> Digi
     }
     model = recording.meta.get("telemetry", {}).get("core", {}).get("golden_model")
     if model not in (None, CACHE_DIR.name):
-        difference["other_golden_model"] = (
-            f"the dump was made with golden model {model}, this is {CACHE_DIR.name}"
-        )
+        difference["other_golden_model"] = f"the dump was made with golden model {model}, this is {CACHE_DIR.name}"
     return Digital(checked=True, samples=row, first_difference=difference)
 
 
@@ -229,9 +217,7 @@ def _sentences(run, gaps, known, checked, run_in, local) -> list[str]:
         lost = sum(count for _, count in gaps)
         said.append(f"{lost} samples are missing in {len(gaps)} places, the first before row {gaps[0][0]}.")
     if checked:
-        said.append(
-            f"The golden model agrees in every bit: {checked} samples with {len(run.names)} signals each."
-        )
+        said.append(f"The golden model agrees in every bit: {checked} samples with {len(run.names)} signals each.")
     if checked:
         said.append("The gate signals are not recorded: they and the register dead_time were not checked.")
     if run_in:

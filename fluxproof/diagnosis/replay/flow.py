@@ -123,9 +123,7 @@ def _overheard(function, notes, **others):
     """The function as plain Python, with listeners instead of the blocks; ``others``: further names it sees."""
     modules = {module for module, _ in fluxproof.WIRING.values()}
     names = dict(function.__globals__) | others
-    names |= {
-        k: _Listener(v, notes) for k, v in names.items() if isinstance(v, types.ModuleType) and v in modules
-    }
+    names |= {k: _Listener(v, notes) for k, v in names.items() if isinstance(v, types.ModuleType) and v in modules}
     return types.FunctionType(function.__code__, names)
 
 

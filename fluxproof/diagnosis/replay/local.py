@@ -122,8 +122,7 @@ def _one(x, r, c, now, before):
     compare_a, compare_b, compare_c = before[0], before[1], before[2]
     lambda_m_alpha, lambda_m_beta, lambda_pi_d, lambda_pi_q = before[3], before[4], before[5], before[6]
     i_a, i_b, i_c, rail = current_conditioning.step(
-        x[0], x[1], x[2], r.offset_a, r.offset_b, r.offset_c, r.gain_a, r.gain_b, r.gain_c,
-        r.two_sensors, c.adc_bits
+        x[0], x[1], x[2], r.offset_a, r.offset_b, r.offset_c, r.gain_a, r.gain_b, r.gain_c, r.two_sensors, c.adc_bits
     )
     (theta_me,) = position.step(x[4], r.reverse, r.pole_pairs, r.theta_offset, c.position_bits)
     u_dc, u_max, u_rail = u_dc_conditioning.step(x[3], r.u_dc_offset, r.u_dc_gain, r.k_u_max, c.adc_bits)
@@ -137,17 +136,13 @@ def _one(x, r, c, now, before):
     model_d, model_q, merged_d, merged_q, merged, ended = flux_models.step(
         i_d, i_q, flux_d, flux_q, before[7], x[12], minus_rho, r.flux_mode * c.estimators, r.l_d, r.l_q, r.lambda_mg
     )  # fmt: skip
-    own_d, own_q, _ = flux_estimate.step(
-        model_d, model_q, merged_d, merged_q, merged, ended, lambda_pi_d, lambda_pi_q
-    )
+    own_d, own_q, _ = flux_estimate.step(model_d, model_q, merged_d, merged_q, merged, ended, lambda_pi_d, lambda_pi_q)
     (chord,) = chord_speed.step(omega_me, r.k_chord)
     dec_d, dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
     u_alpha, u_beta = inverse_park.step(u_d, u_q, cos_out, sin_out)
     duty_a, duty_b, duty_c = svm.step(u_alpha, u_beta, inverse, inverse_beta)
     new_a, new_b, new_c = pwm_compare.step(duty_a, duty_b, duty_c, r.min_pulse, r.double_update, c.carrier_half)
-    on_alpha, on_beta, _ = applied_voltage.step(
-        compare_a, compare_b, compare_c, u_dc, u_rail, x[12], c.carrier_half
-    )
+    on_alpha, on_beta, _ = applied_voltage.step(compare_a, compare_b, compare_c, u_dc, u_rail, x[12], c.carrier_half)
     (torque_me,) = torque.step(lambda_d, lambda_q, i_d, i_q)
     if not c.estimators:
         lost = on_alpha = on_beta = torque_me = 0

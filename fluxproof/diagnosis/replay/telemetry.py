@@ -141,14 +141,10 @@ def _header(drive, register_set, names, count, first_state) -> dict:
         "sample_time_s": drive.sample_time_s,
         "duty_applied_after_samples": drive.control.duty_applied_after_samples,
         "config": register_set.config._asdict(),
-        "bases": {
-            k: getattr(drive.bases, k) for k in ("current_a", "voltage_v", "omega_me_rad_s", "flux_wb")
-        },
+        "bases": {k: getattr(drive.bases, k) for k in ("current_a", "voltage_v", "omega_me_rad_s", "flux_wb")},
         "fields": [described(name) for name in (*fluxproof.Sample._fields, *names)],
         "registers": register_set.values._asdict(),
-        "first_state": None
-        if first_state is None
-        else [list(p) if isinstance(p, tuple) else p for p in first_state],
+        "first_state": None if first_state is None else [list(p) if isinstance(p, tuple) else p for p in first_state],
     }
     header = json.loads(json.dumps(header, default=int))
     return header | {"checksum": _checksums(header)}
@@ -168,9 +164,7 @@ def _checksums(header) -> dict:
     for key, value in header.items():
         if key != "checksum":
             parts["judged" if key in JUDGED else "fixed"][key] = value
-    canonical = {
-        name: json.dumps(part, sort_keys=True, separators=(",", ":")) for name, part in parts.items()
-    }
+    canonical = {name: json.dumps(part, sort_keys=True, separators=(",", ":")) for name, part in parts.items()}
     return {name: zlib.crc32(text.encode()) for name, text in canonical.items()}
 
 
@@ -230,9 +224,7 @@ def _check_names(path, header):
         if name not in fluxproof.REGISTERS:
             raise RecordingError(f"{path}: header: register {shown(name)} is unknown to this core")
         if type(value) is not int or not -(2**31) <= value < 2**31:
-            raise RecordingError(
-                f"{path}: header: register {name} = {str(value)[:40]} must be a 32-bit integer"
-            )
+            raise RecordingError(f"{path}: header: register {name} = {str(value)[:40]} must be a 32-bit integer")
     missing = [name for name in fluxproof.REGISTERS if name not in header["registers"]]
     if missing:
         raise RecordingError(f"{path}: header: register {missing[0]} is missing")

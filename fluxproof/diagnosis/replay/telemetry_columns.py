@@ -31,9 +31,7 @@ def columns_of(meta: dict) -> dict[str, np.ndarray]:
     columns = {"t": (meta["counter"] - meta["counter"][0]) * t_s}
     for x in "abc":
         columns[f"i_{x}"] = read(code[f"adc_{x}"], f"offset_{x}", f"gain_{x}", bases["current_a"])
-    columns["theta_e"] = (
-        electrical_angle(code["position_code"], regs, config["position_bits"]) * TURN.lsb * TURN_RAD
-    )
+    columns["theta_e"] = electrical_angle(code["position_code"], regs, config["position_bits"]) * TURN.lsb * TURN_RAD
     if "omega_me" in observed:
         columns["omega_e"] = observed["omega_me"] * scales["omega_me"]
     else:
@@ -51,9 +49,7 @@ def columns_of(meta: dict) -> dict[str, np.ndarray]:
     elif not code["speed_mode"].any():
         columns["i_q_ref"] = code["i_q_ext"] * scales["i_q_ext"]
     if code["temp_valid"].any():
-        columns["temp_winding"] = np.where(
-            code["temp_valid"], code["temp_winding"] * scales["temp_winding"], np.nan
-        )
+        columns["temp_winding"] = np.where(code["temp_valid"], code["temp_winding"] * scales["temp_winding"], np.nan)
     return {name: np.ascontiguousarray(values, float) for name, values in columns.items()}
 
 

@@ -153,9 +153,7 @@ def _what_is_wrong(row: np.ndarray, byte: int) -> str:
     for field_name, field in LAYOUT.items():
         value = int(_values(row[None], field)[0])
         if not field.port.fmt.lo <= value <= field.port.fmt.hi:
-            shown = (
-                f"word {field.word} is 0x{row[field.word]:08x}: {field_name} = {value} is no {field.port.fmt}"
-            )
+            shown = f"word {field.word} is 0x{row[field.word]:08x}: {field_name} = {value} is no {field.port.fmt}"
             return f"the packet at byte {byte} is damaged: {shown}"
     word = int(np.flatnonzero(row & ~USED)[0])
     return (
@@ -170,11 +168,7 @@ def _why_nothing(raw: bytes) -> str:
         return f"{len(raw)} bytes are too few for a telemetry packet, which has {SIZE}"
     for found in re.finditer(rb"(?s)(?=(..)" + packet.MAGIC.to_bytes(2, "little") + b")", raw):
         at, (count, version) = found.start(), found.group(1)
-        if (
-            count
-            and raw[at + 4 * count : at + 4 * count + 4] == raw[at : at + 4]
-            and raw[at : at + 4] != MARK
-        ):
+        if count and raw[at + 4 * count : at + 4 * count + 4] == raw[at : at + 4] and raw[at : at + 4] != MARK:
             return (
                 f"byte {at}: telemetry packets of version {version} with {count} words: this reader knows version "
                 f"{packet.VERSION} with {COUNT}"

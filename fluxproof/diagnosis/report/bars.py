@@ -66,9 +66,7 @@ def shares(diagnosis) -> theme.Picture:
     figure, axis = theme.axes(height=0.7 + 0.36 * len(rows))
     for place, (_, share, text, color) in enumerate(rows):
         axis.barh(place, np.clip(share, 0.0, 1.0), 0.7, color=color)
-        axis.annotate(
-            text, (np.clip(share, 0.0, 1.0), place), (4, 0), textcoords="offset points", va="center"
-        )
+        axis.annotate(text, (np.clip(share, 0.0, 1.0), place), (4, 0), textcoords="offset points", va="center")
     labels = [theme.plain(t if len(t) <= LONGEST else f"{t[: LONGEST - 1]}…") for t, *_ in rows]
     axis.set_yticks(range(len(rows)), labels)
     axis.set(xlim=(0, 1.18), xticks=(0, 0.5, 1), xticklabels=("0", "50 %", "100 %"))
