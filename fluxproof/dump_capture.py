@@ -13,7 +13,7 @@ from pathlib import Path
 
 from fluxproof.diagnosis.whole_drive import load_drive
 from fluxproof.files import refuse_overwriting
-from fluxproof.quote import say
+from fluxproof.quote import put, say
 from fluxproof.stage import alone
 from golden_model import fluxproof
 from golden_model.board_registers import board_set
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     number = chosen(capture.pieces, args.piece, args.capture)
     with alone(out) as file:
         write_piece(file, capture.pieces[number], drive, register_set)
-    print("\n".join(summary(capture, number)))
+    put("\n".join(summary(capture, number)))
     say(f"wrote {out}")
     return 0
 

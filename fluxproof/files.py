@@ -65,6 +65,11 @@ def naming(path: Path) -> Iterator[None]:
         raise
 
 
+def stem_of(path: str | os.PathLike) -> str:
+    """The name of a file without its suffix, as the name of a folder: of "...csv" it would be the parent folder."""
+    return Path(path).stem.strip(".") or "recording"
+
+
 def direct(path: Path) -> bool:
     """Whether it is no place for a file: /dev/stdout may be a link to one, and must stay a link."""
     return path.parent == Path("/dev") or (path.exists() and not path.is_file() and not path.is_dir())

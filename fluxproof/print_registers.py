@@ -12,7 +12,7 @@ from pathlib import Path
 
 from fluxproof.diagnosis.whole_drive import load_drive
 from fluxproof.files import refuse_overwriting, write_json
-from fluxproof.quote import c_comment
+from fluxproof.quote import c_comment, put
 from fluxproof.stage import alone
 from golden_model.board_registers import board_generics, board_set, has_board
 from golden_model.drive import Drive
@@ -49,11 +49,11 @@ def run(args: argparse.Namespace) -> int:
         with alone(Path(args.json)) as file:
             write_json(file, as_json(drive, result))
     if args.format == "c":
-        print("\n".join(c_lines(args.drive, drive, result)))
+        put("\n".join(c_lines(args.drive, drive, result)))
     elif args.format == "json":
-        print(json.dumps(load_list(result), indent=2))
+        put(json.dumps(load_list(result), indent=2))
     else:
-        print("\n".join(bases_lines(drive, result) + [""] + table(result.rows)))
+        put("\n".join(bases_lines(drive, result) + [""] + table(result.rows)))
     return 0
 
 

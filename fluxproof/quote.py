@@ -52,7 +52,17 @@ def printable(text: str, encoding: str | None) -> str:
 def say(text: str, stream: TextIO | None = None) -> None:
     """Print one line at once, on stdout or on ``stream``."""
     out = sys.stdout if stream is None else stream
-    print(printable(text, out.encoding), file=out, flush=True)
+    put(printable(text, out.encoding), out)
+
+
+def put(text: str, stream: TextIO | None = None) -> None:
+    """Print text of several lines as it is; OSError names the stream."""
+    out = stream or sys.stdout
+    try:
+        print(text, file=out, flush=True)
+    except OSError as error:
+        error.filename = "standard error" if out is sys.stderr else "standard output"
+        raise
 
 
 def tcl_word(text: str) -> str:

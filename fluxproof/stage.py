@@ -4,11 +4,14 @@
     with together(out, ("report.html", "drive_improved.toml")) as stage:
         write_text(stage / "report.html", page)
 
-The files are written into a hidden folder inside ``out``, .fluxproof-PID-…, on the same file system.  At the end it is
-renamed to .fluxproof-done: from then on the new result counts.  Then each file is moved into ``out``, and each owned
+The files are written into a hidden folder inside ``out``, .fluxproof-new-…, on the same file system.  At the end it is
+renamed to .fluxproof-done-…: from then on the new result counts.  Then each file is moved into ``out``, and each owned
 name that was not written is removed.  A process that is killed before the renaming leaves the earlier result as it was;
-one that is killed afterwards leaves .fluxproof-done, and the next one that writes into ``out`` finishes the moves.
+one that is killed afterwards leaves .fluxproof-done-…, and the next one that writes into ``out`` finishes the moves.
 The hidden folder is locked by the process that fills it, so that the next one knows and removes what has no owner.
+
+A hidden folder counts as ours only if the plan in it names the folder's own place on the disk (device and inode): one
+that came with a stranger's archive cannot know it, and is left alone.
 """
 
 from __future__ import annotations
@@ -27,14 +30,16 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from fluxproof.files import direct, naming
+from golden_model.regular_file import open_regular
 
 try:
     import fcntl
 except ImportError:  # no such locks on this system: nothing is removed that may be in use
     fcntl = None
 
-PREFIX, DONE = ".fluxproof-", ".fluxproof-done"
-PLAN = ".remove.json"  # in the hidden folder: the names that the finished result no longer has
+NEW, DONE = ".fluxproof-new-", ".fluxproof-done-"
+PLAN = ".plan.json"  # in the hidden folder: its place on the disk, and the names that the finished result no longer has
+MOST_PLAN = 100_000  # bytes
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
@@ -66,6 +71,16 @@ def together(out: str | os.PathLike, owned: Sequence[str] = ()) -> Iterator[Path
         raise
     finally:
         _close(lock)
+
+
+def check(out: str | os.PathLike, owned: Sequence[str] = ()) -> None:
+    """OSError, before a long work, if ``together`` could not write into ``out``; nothing is left there."""
+
+    class Tried(Exception):
+        pass
+
+    with contextlib.suppress(Tried), together(out, owned):
+        raise Tried
 
 
 @contextlib.contextmanager
@@ -104,8 +119,10 @@ def _opened(out: Path) -> tuple[Path, int | None]:
     try:
         _settle(out)
         with naming(out):
-            stage = Path(tempfile.mkdtemp(prefix=f"{PREFIX}{os.getpid()}-", dir=out))
-        return stage, _locked(stage)
+            stage = Path(tempfile.mkdtemp(prefix=NEW, dir=out))
+            handle = _locked(stage)  # before the plan is there, by which the next process would take it for left behind
+            _write_plan(stage, [])
+        return stage, handle
     finally:
         _close(lock)
 
@@ -115,11 +132,11 @@ def _enter(stage: Path, out: Path, owned: Sequence[str]) -> None:
     lock = _locked(out)
     try:
         _finish(out)
-        written = {path.name for path in stage.iterdir()}
+        written = {path.name for path in stage.iterdir()} - {PLAN}
         _refuse_folders(out, written)
         with naming(out):
-            (stage / PLAN).write_text(json.dumps([name for name in owned if name not in written]))
-        os.rename(stage, out / DONE)
+            _write_plan(stage, [name for name in owned if name not in written])
+        os.rename(stage, out / stage.name.replace(NEW, DONE, 1))
         _finish(out)
     finally:
         _close(lock)
@@ -128,34 +145,45 @@ def _enter(stage: Path, out: Path, owned: Sequence[str]) -> None:
 def _settle(out: Path) -> None:
     """Finish the moves of a killed process and remove the hidden folders of those that no longer run."""
     _finish(out)
-    for left in out.glob(f"{PREFIX}*"):
-        if not _mine(left) or (lock := _locked(left, seconds=0.0)) is None:
+    for left in out.glob(f"{NEW}*"):
+        if _plan(left) is None or (lock := _locked(left, seconds=0.0)) is None:
             continue
         shutil.rmtree(left, ignore_errors=True)
         _close(lock)
 
 
 def _finish(out: Path) -> None:
-    """Move what .fluxproof-done holds into ``out``; can be repeated after an interruption at any point."""
-    done = out / DONE
-    if not _mine(done) or not (done / PLAN).is_file():
-        return
-    for name in _removals(done / PLAN):
-        (out / name).unlink(missing_ok=True)
-    for path in sorted(done.iterdir()):
-        if path.name != PLAN:
-            os.replace(path, out / path.name)
-    shutil.rmtree(done)
+    """Move what a finished hidden folder holds into ``out``; can be repeated after an interruption at any point."""
+    for done in sorted(out.glob(f"{DONE}*")):
+        if (removals := _plan(done)) is None:
+            continue
+        for name in removals:
+            (out / name).unlink(missing_ok=True)
+        for path in sorted(done.iterdir()):
+            if path.name != PLAN:
+                os.replace(path, out / path.name)
+        shutil.rmtree(done)
 
 
-def _removals(plan: Path) -> list[str]:
-    """The names of the plan that are names of files in a folder: the plan may have come with a stranger's folder."""
+def _write_plan(stage: Path, removals: list[str]) -> None:
+    (stage / PLAN).write_text(json.dumps({"place": _place(stage), "remove": removals}))
+
+
+def _plan(folder: Path) -> list[str] | None:
+    """The names to remove of a hidden folder that this command made here; None for any other folder or file."""
     try:
-        names = json.loads(plan.read_text())
-    except (ValueError, RecursionError):
-        return []
-    plain = [name for name in names if isinstance(name, str)] if isinstance(names, list) else []
-    return [name for name in plain if name == os.path.basename(name) and name not in ("", ".", "..")]
+        if not _mine(folder):
+            return None
+        with open_regular(folder / PLAN) as file:
+            plan = json.loads(file.read(MOST_PLAN))
+        return plan["remove"] if plan["place"] == _place(folder) else None
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        return None
+
+
+def _place(folder: Path) -> list[int]:
+    found = folder.lstat()
+    return [found.st_dev, found.st_ino]
 
 
 def _refuse_folders(out: Path, names) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import resource
 import signal
 import subprocess
@@ -17,8 +18,8 @@ import pytest
 
 from cocotb_tests.support.processes.moments import Moment, contents, run
 from fluxproof.checkout import ROOT
-from fluxproof.files import refuse_overwriting, write_bytes, write_text
-from fluxproof.stage import DONE, PLAN, PREFIX, alone, together
+from fluxproof.files import refuse_overwriting, stem_of, write_bytes, write_text
+from fluxproof.stage import DONE, NEW, PLAN, alone, check, together
 
 NAMES = ("a", "b", "gone")
 EARLIER = {"a": b"1", "b": b"1", "gone": b"1", "mine": b"mine"}
@@ -72,12 +73,12 @@ def test_an_exception_leaves_the_folder_as_it_was(out, tmp_path, error):
 
 # Six moments: before the decision, at it, before the removal, each move, and the removal of the hidden folder.
 KILLED = [
-    (Moment("open", PLAN), EARLIER),
-    (Moment("os.rename", DONE), EARLIER),
+    (Moment("open", re.escape(PLAN), after=1), EARLIER),
+    (Moment("os.rename", re.escape(DONE)), EARLIER),
     (Moment("os.remove", "out/gone"), LATER),
-    (Moment("os.rename", f"{DONE}/a"), LATER),
-    (Moment("os.rename", f"{DONE}/b"), LATER),
-    (Moment("shutil.rmtree", DONE), LATER),
+    (Moment("os.rename", rf"{DONE}\w+/a$"), LATER),
+    (Moment("os.rename", rf"{DONE}\w+/b$"), LATER),
+    (Moment("shutil.rmtree", re.escape(DONE)), LATER),
 ]
 
 
@@ -86,9 +87,9 @@ def test_the_next_run_finishes_or_removes_what_a_killed_one_left(out, tmp_path, 
     moment = moment._replace(number=signal.SIGKILL)
     done = run(tmp_path / "hook", [out, "2"], moment, [sys.executable, "-c", RUN])
     assert done.returncode == -signal.SIGKILL
-    assert any(name.startswith(PREFIX) for name in os.listdir(out)), "nothing was interrupted"
+    assert any(name.startswith((NEW, DONE)) for name in os.listdir(out)), "nothing was interrupted"
     with pytest.raises(ValueError), together(out, NAMES):
-        assert {n: d for n, d in contents(out).items() if not n.startswith(PREFIX)} == result
+        assert {n: d for n, d in contents(out).items() if not n.startswith((NEW, DONE))} == result
         raise ValueError
     assert contents(out) == result
 
@@ -116,7 +117,7 @@ def test_the_folder_of_a_running_process_stays(out):
     with together(out, NAMES) as stage:
         write_text(stage / "a", "3")
         write(out)
-        assert stage.exists() and contents(stage) == {"a": b"3"}
+        assert stage.exists() and (stage / "a").read_bytes() == b"3"
     assert contents(out) == {"a": b"3", "mine": b"mine"}
 
 
@@ -191,21 +192,27 @@ def test_a_link_is_replaced_and_its_target_kept(out):
     assert contents(out) == LATER and not (out / "a").is_symlink()
 
 
-def test_a_plan_from_a_stranger_removes_nothing_elsewhere(out, tmp_path):
+@pytest.mark.parametrize("name", [f"{DONE}x", f"{NEW}x", ".fluxproof-done", ".fluxproof-backup"])
+@pytest.mark.parametrize("removes", [["mine"], ["../other"], ["a\0b"], ["\ud800"], ["x" * 300], None])
+def test_a_hidden_folder_from_a_stranger_is_left_alone(out, tmp_path, name, removes):
+    """It cannot know its place on the disk, without which its plan removes and overwrites nothing."""
     write_text(tmp_path / "other", "other")
-    write_text(out / DONE / PLAN, json.dumps(["../other", str(tmp_path / "other"), ".", "..", "", 3, None]))
-    write(out)
-    assert contents(out) == LATER and (tmp_path / "other").read_text() == "other"
-    for plan in ("[", "3", "[" * 100_000):
-        write_text(out / DONE / PLAN, plan)
+    write_text(out / name / "mine", "evil")
+    plans = [json.dumps({"place": [1, 2], "remove": removes}), json.dumps(removes), "[" * 100_000, "{"]
+    for plan in plans:
+        write_text(out / name / PLAN, plan)
         write(out)
-        assert contents(out) == LATER
+        assert (out / "mine").read_text() == "mine" and (tmp_path / "other").read_text() == "other"
+        assert (out / name / "mine").read_text() == "evil" and (out / "a").read_bytes() == b"2"
+
+
+def test_a_file_or_a_link_with_a_hidden_name_is_no_obstacle(out, tmp_path):
     write_text(tmp_path / "elsewhere" / PLAN, "[]")
-    write_text(tmp_path / "elsewhere" / "file", "text")
-    (out / DONE).symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(OSError):
-        write(out)
-    assert contents(tmp_path / "elsewhere") == {PLAN: b"[]", "file": b"text"} and (out / "a").read_bytes() == b"2"
+    (out / f"{DONE}x").symlink_to(tmp_path / "elsewhere")
+    write_text(out / f"{NEW}x", "text")
+    write_text(out / ".fluxproof-done", "text")
+    write(out)
+    assert contents(tmp_path / "elsewhere") == {PLAN: b"[]"} and (out / "a").read_bytes() == b"2"
 
 
 def test_an_input_is_no_output(tmp_path):
@@ -220,3 +227,20 @@ def test_an_input_is_no_output(tmp_path):
         with pytest.raises(OSError, match="would be overwritten") as refused:
             refuse_overwriting([other, target], [str(drive)])
         assert refused.value.filename == str(target)
+
+
+def test_a_folder_is_tried_before_the_work(out, tmp_path):
+    before = contents(out)
+    check(out, NAMES)
+    check(tmp_path / "new" / "deep", NAMES)
+    assert contents(out) == before and not (tmp_path / "new").exists()
+    with pytest.raises(OSError, match="mine"):
+        check(out / "mine", NAMES)
+    assert contents(out) == before
+
+
+@pytest.mark.parametrize(
+    ("name", "stem"), [("...csv", "recording"), ("a.b.csv", "a.b"), ("..", "recording"), (".x", "x")]
+)
+def test_a_name_of_a_file_stays_in_its_folder(name, stem):
+    assert stem_of(f"folder/{name}") == stem

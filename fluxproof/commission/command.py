@@ -15,9 +15,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from fluxproof.diagnosis.whole_drive import load_drive
-from fluxproof.files import refuse_overwriting, write_json, write_text
+from fluxproof.files import refuse_overwriting, stem_of, write_json, write_text
 from fluxproof.quote import say
-from fluxproof.stage import SIGNALS, together
+from fluxproof.stage import SIGNALS, check, together
 from golden_model.drive import load
 from golden_model.drive_file import read_tables, read_text
 from golden_model.drive_keys import DriveError
@@ -45,8 +45,9 @@ def run(args: argparse.Namespace) -> int:
         raise DriveError(f"{args.drive}: [machine] magnet_flux_wb = 0: commissioning is for machines with magnets")
     given = read_tables(args.drive).get("sensors", {})
     reverse = given.get("position_reverse")
-    folder = Path(args.out) if args.out else Path("build") / "commission" / Path(args.drive).stem
+    folder = Path(args.out) if args.out else Path("build") / "commission" / stem_of(args.drive)
     refuse_overwriting([folder / name for name in (DATA, DRIVE, EARLIER)], [args.drive])
+    check(folder, (DATA, DRIVE, EARLIER))
     _say("loading")
     bus = open_bus(args.bus, drive)
     return commission_file(bus, args.drive, drive, reverse, folder)

@@ -13,6 +13,7 @@ import sys
 import webbrowser
 from pathlib import Path
 
+from fluxproof.files import stem_of
 from fluxproof.quote import printable, say
 
 FOLDER = Path("build") / "diagnosis"
@@ -92,7 +93,7 @@ def show(page: Path) -> bool:
 def default_folder(recordings) -> Path:
     """build/diagnosis/ and the first recording's name without its suffix."""
     more = f"_and_{len(recordings) - 1}_more" if len(recordings) > 1 else ""
-    return FOLDER / f"{Path(recordings[0]).stem}{more}"
+    return FOLDER / f"{stem_of(recordings[0])}{more}"
 
 
 class Progress:

@@ -53,11 +53,11 @@ def run(args: argparse.Namespace) -> int:
     for name in found:
         say(str(folder / name))
     if processor is None:
-        print(f"no device tree: {part} has no processor; the script builds the core alone")
+        say(f"no device tree: {part} has no processor; the script builds the core alone")
     elif has_board(drive):
-        print("the script builds fluxproof_board alone: its pins are those of your board")
+        say("the script builds fluxproof_board alone: its pins are those of your board")
     elif processor is not parts.ZYNQ:
-        print(f"the script builds the core alone: the block design around it is for {parts.ZYNQ.name}")
+        say(f"the script builds the core alone: the block design around it is for {parts.ZYNQ.name}")
     return 0
 
 

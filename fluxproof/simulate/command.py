@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 from fluxproof.diagnosis.whole_drive import load_drive, stated_plant
-from fluxproof.files import refuse_overwriting, write_json, write_text
+from fluxproof.files import refuse_overwriting, stem_of, write_json, write_text
 from fluxproof.quote import say
 from fluxproof.stage import together
 from golden_model.drive_keys import DriveError
@@ -29,7 +29,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Simulate, write both files, say the result."""
     began = time.monotonic()
-    folder = Path(args.out) if args.out else Path("build") / "simulate" / Path(args.drive).stem
+    folder = Path(args.out) if args.out else Path("build") / "simulate" / stem_of(args.drive)
     refuse_overwriting([folder / DATA, folder / REPORT], [args.drive])
     drive = load_drive(args.drive)
     _say("loading the model")

@@ -17,14 +17,14 @@ from typing import NamedTuple
 from fluxproof.checkout import ROOT
 
 HOOK = """
-import os, sys
+import os, re, sys
 
 event, text, left, number, process = {event!r}, {text!r}, [{after}], {number}, os.getpid()
 
 def hook(name, args):
     if name != event or os.getpid() != process:
         return
-    if any(text in os.fsdecode(arg) for arg in args if isinstance(arg, (str, bytes, os.PathLike))):
+    if any(re.search(text, os.fsdecode(arg)) for arg in args if isinstance(arg, (str, bytes, os.PathLike))):
         left[0] -= 1
         if left[0] == -1:
             os.kill(process, number)
@@ -34,7 +34,7 @@ sys.addaudithook(hook)
 
 
 class Moment(NamedTuple):
-    """The signal is sent at the event that has ``text`` among its arguments, ``after`` others of that kind."""
+    """The signal is sent at the event that has the regular expression ``text`` in an argument, after others of it."""
 
     event: str
     text: str
