@@ -83,6 +83,15 @@ def test_mdf_that_declares_much(tmp_path):
     quick(path, "1000000000000 samples")
 
 
+@pytest.mark.parametrize(("kind", "shape"), [("|S0", "(-1,)"), ("|S0", "(3, 2)"), ("<f8", "(-1, 2)"), ("|V0", "(-5,)")])
+def test_sizes_by_which_numpy_would_divide_by_zero(tmp_path, kind, shape):
+    """A find of `make fuzz`: the process ended with SIGFPE."""
+    header = f"{{'descr': '{kind}', 'fortran_order': True, 'shape': {shape}}}".ljust(117) + "\n"
+    path = tmp_path / "r.npy"
+    path.write_bytes(b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header.encode())
+    quick(path, "the array declares")
+
+
 @pytest.mark.parametrize("version", ["3.30", "4.10"])
 def test_a_ring_of_channel_groups_in_an_mdf_file(tmp_path, version):
     """The next group of the only group is itself: asammdf would count groups for ever."""

@@ -61,6 +61,8 @@ def _table(arrays, path) -> Table:
 
 def _single(path, select) -> Table:
     """The columns of one array, memory-mapped instead of read as a whole."""
+    with open(path, "rb") as file:
+        _header(path, file, "the array")
     array = np.load(path, mmap_mode="r", allow_pickle=False)
     if array.dtype.names:
         arrays = {name: array[name] for name in array.dtype.names if array.ndim == 1 and array[name].ndim == 1}
@@ -103,15 +105,25 @@ def _archive(path, select) -> Table:
 
 def _declared(path, archive, member) -> tuple[int, bool]:
     """(numbers that the header of one array declares, whether it is stored without pickled objects)."""
-    form = np.lib.format
     with archive.open(member) as file:
-        try:
-            version = form.read_magic(file)
-            header = form.read_array_header_1_0 if version == (1, 0) else form.read_array_header_2_0
-            shape, _, dtype = header(file)
-        except ValueError as error:
-            name = shown(member.filename)
-            raise RecordingError(f"{path}: array {name}: {shown(error, 120)}") from None
-    if any(n < 0 for n in shape):
-        raise RecordingError(f"{path}: array {shown(member.filename)} declares a negative size")
+        shape, dtype = _header(path, file, f"array {shown(member.filename)}")
     return math.prod(shape) * max(1, dtype.itemsize // 8), not dtype.hasobject
+
+
+def _header(path, file, what: str) -> tuple[tuple[int, ...], np.dtype]:
+    """(shape, type) that the header of an array declares; RecordingError for what NumPy cannot survive.
+
+    Of a negative size and elements without bytes NumPy divides by zero, which ends the process.
+    """
+    form = np.lib.format
+    try:
+        version = form.read_magic(file)
+        header = form.read_array_header_1_0 if version == (1, 0) else form.read_array_header_2_0
+        shape, _, dtype = header(file)
+    except ValueError as error:
+        raise RecordingError(f"{path}: {what}: {shown(error, 120)}") from None
+    if any(n < 0 for n in shape):
+        raise RecordingError(f"{path}: {what} declares a negative size")
+    if not dtype.itemsize:
+        raise RecordingError(f"{path}: {what} declares elements of no bytes")
+    return shape, dtype
