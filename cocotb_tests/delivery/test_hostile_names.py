@@ -28,8 +28,10 @@ from fluxproof.diagnosis.ground.recording import from_columns
 from fluxproof.diagnosis.ingest.units import split_unit
 from fluxproof.diagnosis.report import pictures, write_outputs
 from fluxproof.project import parts
+from fluxproof.project.command import core_folder
 from fluxproof.quote import visible
 from golden_model.drive_file import read_tables
+from golden_model.drive_keys import DriveError
 
 ARTIX, ULTRASCALE = "xc7a100tcsg324-1", "xczu3eg-sbva484-1-e"
 SPACES = " " * 100_000
@@ -243,3 +245,9 @@ def test_a_file_with_many_points_is_read(tmp_path):
     points = "." * 200 + "a.b" * 60
     text = f'# {points}\na = \'{points}\' # {points}\nb = """\n{points}\n"""\nc = [{"1.5, " * 100}]\n'
     assert read_tables(named(tmp_path, "drive.toml", text))["c"] == [1.5] * 100
+
+
+def test_a_core_folder_that_no_system_has_is_refused():
+    """A find of `make fuzz`."""
+    with pytest.raises(DriveError, match=r"--core 'a\\x00b': no name of a folder"):
+        core_folder("a\0b")

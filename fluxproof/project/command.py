@@ -73,5 +73,8 @@ def address(text: str) -> int:
 def core_folder(given: str | None) -> str:
     """The folder in the script: the one given, this checkout, or none for an installed package."""
     if given:
-        return Path(given).resolve().as_posix()
+        try:
+            return Path(given).resolve().as_posix()
+        except (OSError, RuntimeError, ValueError) as error:  # a ring of links, a zero byte
+            raise DriveError(f"--core '{shown(given)}': no name of a folder: {error}") from None
     return ROOT.as_posix() if (ROOT / "scripts" / "vivado").is_dir() else ""
