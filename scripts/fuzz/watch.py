@@ -35,6 +35,7 @@ COMPILES = (
     "reprlib.py",
 )
 INSTALLED = tuple({str(Path(p).resolve()) for p in (*sysconfig.get_paths().values(), sys.prefix, sys.base_prefix)})
+OUR_CLASSES = ("golden_model.", "fluxproof.plant.")  # compiled kernels find the tuples that they return by pickle, in C
 OWN_LOADING = ("<frozen importlib", os.path.join("numba", "core", "caching.py"))
 SYSTEM = ("/proc/self/", "/proc/cpuinfo", "/proc/meminfo", "/sys/devices/system/", "/dev/null", "/dev/urandom", "/usr/")
 SYSTEM += ("/etc/mime.types", "/etc/localtime", "/etc/fonts", "/sys/fs/cgroup", "/proc/stat")
@@ -82,6 +83,8 @@ class Watch:
             return self._of_open(*args[:3])
         if event in CHANGES and not isinstance(args[0], int):
             return "" if self._own(args[0]) or _of_kernels(args[0]) else f"{event} {args[0]!r}"
+        if event == "pickle.find_class" and str(args[0]).startswith(OUR_CLASSES):
+            return ""
         return f"{event} {args!r}"[:300] if event in FORBIDDEN and not _inside(OWN_LOADING) else ""
 
     def _of_code(self, code) -> str:

@@ -112,7 +112,8 @@ class Worker:
 
     def _log(self) -> str:
         with open(self.folder / "child.log", errors="replace") as file:
-            return file.read()[-4000:]
+            lines = [line for line in file if not line.startswith("Extension modules:")]  # a line longer than the stack
+            return "".join(lines)[-4000:]
 
     def close(self) -> None:
         self._stop()
