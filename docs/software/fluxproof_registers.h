@@ -21,7 +21,7 @@ extern "C" {
 #define FLUXPROOF__VERSION__VALUE_bm 0xffffffff
 #define FLUXPROOF__VERSION__VALUE_bp 0
 #define FLUXPROOF__VERSION__VALUE_bw 32
-#define FLUXPROOF__VERSION__VALUE_reset 0x100
+#define FLUXPROOF__VERSION__VALUE_reset 0x200
 
 // reg - fluxproof::adc_bits
 #define FLUXPROOF__ADC_BITS__VALUE_bm 0xffffffff

@@ -785,7 +785,7 @@ begin
 
   -- Contents of the other words, signed numbers in 18 bits; the places between are zero
   shown(0)          <= x"464C5558";
-  shown(1)          <= x"00000100";
+  shown(1)          <= x"00000200";
   shown(2)          <= std_logic_vector(to_unsigned(ADC_BITS, 32));
   shown(3)          <= std_logic_vector(to_unsigned(POSITION_BITS, 32));
   shown(4)          <= std_logic_vector(to_unsigned(CARRIER_HALF, 32));
