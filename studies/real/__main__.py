@@ -73,8 +73,8 @@ def studied(names, args) -> dict:
 def main(arguments=None) -> int:
     parser = argparse.ArgumentParser(prog="python -m studies.real", description=__doc__.splitlines()[0])
     every = [*PARTS, *(case.name for case in CASES)]
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(PARTS)}; default: all")
-    parser.add_argument("--only", action="append", default=[], metavar="NAME", help="a case of truth.py, or a NAME")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="as --only; default: all")
+    parser.add_argument("--only", action="append", default=[], metavar="NAME", help=f"of {', '.join(PARTS)}, or a case of truth.py")
     parser.add_argument("--jobs", type=int, default=2, help="diagnoses at once (default: 2)")
     parser.add_argument("--out", type=Path, default=BUILD / "real")
     parser.add_argument("--quiet", action="store_true")
@@ -84,8 +84,7 @@ def main(arguments=None) -> int:
     if unknown:
         parser.error(f"{unknown[0]} is not one of {', '.join(every)}")
     result = {"schema": 1, "recordings": studied([n for n in PARTS if not chosen or n in chosen], args)}
-    # A part and a case may have one name; a name given by itself is the part, as before there were cases.
-    cases = [c for c in CASES if not chosen or c.name in args.only]
+    cases = [c for c in CASES if not chosen or c.name in chosen]
     result |= scored(cases, args.out / "cases", args.jobs, whole=True)
     print_counts(result)
     write_page(result, args.out / "report.html", "Recordings of real drives and benches")

@@ -153,7 +153,7 @@ CASES = (
     Case("emf_timetable", TIMETABLE, f.at("bench/emf_probe", "line_200rpm_timetable.mat")),
     Case("dyno_frameless", FRAMELESS, f.at("bench/dyno", "frameless.csv", "frameless.toml")),
     Case("dyno_odrive", ODRIVE, f.at("bench/dyno", "odrive.csv", "odrive.toml")),
-    Case("emrax228", EMRAX, f.with_drive("emrax228/coastdown_run.csv", f.DRIVES / "emrax228.toml")),
+    Case("emrax228_log", EMRAX, f.with_drive("emrax228/coastdown_run.csv", f.DRIVES / "emrax228.toml")),
     Case("laas_torque_sine", LAAS, f.with_drive("laas_mn4004/acc_current.txt", f.MN4004)),
     Case("laas_standstill", LAAS, f.with_drive("laas_mn4004/stopped_data.txt", f.MN4004)),
     Case("brusa_map", BRUSA, f.brusa_loop),
