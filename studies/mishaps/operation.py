@@ -93,7 +93,7 @@ MISHAPS = (
     Mishap("trip in dq", "dq", _off_dq, limit=rf"{OFF}|u_q_ref|voltage"),
     Mishap("log starts before enable", "phases", _off(0.0, 0.3, 0.5), limit=OFF),
     Mishap("log starts before enable duties nought", "phases", _off(0.0, 0.3, 0.0), limit=OFF),
-    Mishap("power-up transient", "phases", _power_up),
+    Mishap("currents ring at power-up", "phases", _power_up),
     Mishap("locked rotor", "slow", _locked, ignored=True, causes=(
         Cause(("resistance",), may=("current_scale", "udc_gain")),), limit=r"standstill|turn|stands"),
     Mishap("one direction only", "phases", _chosen(lambda w, c: w > 0.0), readings="gap"),

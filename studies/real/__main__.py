@@ -74,7 +74,9 @@ def main(arguments=None) -> int:
     parser = argparse.ArgumentParser(prog="python -m studies.real", description=__doc__.splitlines()[0])
     every = [*PARTS, *(case.name for case in CASES)]
     parser.add_argument("names", nargs="*", metavar="NAME", help="as --only; default: all")
-    parser.add_argument("--only", action="append", default=[], metavar="NAME", help=f"of {', '.join(PARTS)}, or a case of truth.py")
+    parser.add_argument(
+        "--only", action="append", default=[], metavar="NAME", help=f"of {', '.join(PARTS)}, or a case of truth.py"
+    )
     parser.add_argument("--jobs", type=int, default=2, help="diagnoses at once (default: 2)")
     parser.add_argument("--out", type=Path, default=BUILD / "real")
     parser.add_argument("--quiet", action="store_true")

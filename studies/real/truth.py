@@ -35,7 +35,9 @@ SATURATED = Truth(
     (Cause(("inductance_d",)), Cause(("inductance_q",)), Cause(("magnet_flux",), {"magnet_flux_wb": (0.4, 0.55)})),
     text="saturation and cross-saturation, resistance right",
 )  # fmt: skip
-SATURATED_FAST = Truth(SATURATED.causes, SATURATED.beside, limit=r"steady|short|longer|sample time", text=SATURATED.text)
+SATURATED_FAST = Truth(
+    SATURATED.causes, SATURATED.beside, limit=r"steady|short|longer|sample time", text=SATURATED.text
+)
 DRIFT = {"magnet_flux_drift_wb": (-0.0070, -0.0003)}
 LINEAR = (
     Cause(("resistance",)), Cause(("inductance_d",)), Cause(("inductance_q",)), Cause(("magnet_flux",)),

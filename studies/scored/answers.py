@@ -6,7 +6,6 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-import tomllib
 import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from fluxproof.diagnosis.session import run
 from fluxproof.files import write_json
 from fluxproof.fleet.engine import in_parallel
 from fluxproof.fleet.work import version
+from golden_model.drive_file import read_tables
 from golden_model.drive_keys import DriveError
 
 LEFT_OUT = ("digital", "prior", "location", "fit")  # of diagnosis.json, as no judgement rests on them
@@ -67,7 +67,7 @@ def _improved(given: Path, file: Path) -> str | None:
     """Whether an improved drive file changes anything: "same", "changed"; None if there is none."""
     if not file.exists():
         return None
-    return "same" if tomllib.loads(given.read_text()) == tomllib.loads(file.read_text()) else "changed"
+    return "same" if read_tables(given) == read_tables(file) else "changed"
 
 
 def answers(jobs: list[Job], workers: int) -> Iterator[tuple[Job, dict]]:

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The judge: right, covering, honest limit, withheld or wrong, by rule, from an answer and a truth.
 
-    wrong          an effect that is not there, or of another size, or of a size compatible with zero, or implausible;
-                   an ambiguity, a convention or a correction without the truth; agreement or an explanation where a
-                   cause is missing; an alarm where all agrees; an improved drive equal to the given one; a crash
-    right          every cause is named
-    covering       every cause is named or is in an ambiguity, or the headline of an unexplained misfit describes it
-    honest limit   refused, and the message names the true reason
-    withheld       the rest: refused for another reason, unexplained, or part of the causes
+wrong          an effect that is not there, or of another size, or of a size compatible with zero, or implausible;
+               an ambiguity, a convention or a correction without the truth; agreement or an explanation where a
+               cause is missing; an alarm where all agrees; an improved drive equal to the given one; a crash
+right          every cause is named
+covering       every cause is named or is in an ambiguity, or the headline of an unexplained misfit describes it
+honest limit   refused, and the message names the true reason
+withheld       the rest: refused for another reason, unexplained, or part of the causes
 """
 
 from __future__ import annotations

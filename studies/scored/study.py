@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import sys
-import tomllib
 from pathlib import Path
 
 from jinja2 import Environment
 
 from fluxproof.files import write_text
+from golden_model.drive_file import read_tables
+from golden_model.drive_keys import DriveError
 from studies.scored.answers import Job, answers, job_of
 from studies.scored.judge import headline_of, judge
 from studies.scored.truth import JUDGES, USEFUL, Case
@@ -51,8 +52,8 @@ def scored(cases: list[Case], out: Path, workers: int, whole: bool) -> dict:
 def judged(job: Job, answer: dict, truth) -> dict:
     """The entry of one case."""
     try:
-        machine = tomllib.loads(job.drive.read_text()).get("machine", {})
-    except ValueError:  # no TOML, which the answer says too
+        machine = read_tables(job.drive).get("machine", {})
+    except DriveError:  # no TOML, which the answer says too
         machine = {}
     word, why = judge(answer, truth, machine)
     says = answer.get("refused") or answer.get("crash") or headline_of(answer)
