@@ -34,12 +34,13 @@ def main(arguments=None) -> int:
     parser.add_argument("--only", action="append", default=[], metavar="WORD", help="mishaps whose name contains it")
     parser.add_argument("--base", action="append", choices=list(BASES), help="one of the drives; default: all")
     parser.add_argument("--jobs", type=int, default=2, help="diagnoses at once (default: 2)")
+    parser.add_argument("--again", action="store_true", help="judge the kept answers again, diagnose nothing")
     parser.add_argument("--out", type=Path, default=BUILD / "mishaps")
     args = parser.parse_args(arguments)
     chosen = cases(args.base or list(BASES), args.only)
     if not chosen:
         parser.error(f"no mishap contains {args.only[0]!r}")
-    result = {"schema": 1, **scored(chosen, args.out, args.jobs, whole=False)}
+    result = {"schema": 1, **scored(chosen, args.out, args.jobs, whole=False, again=args.again)}
     print_counts(result)
     write_page(result, args.out / "report.html", "Everyday mishaps on three drives")
     print(write_json(args.out / "result.json", result))

@@ -10,10 +10,10 @@ import numpy as np
 from studies.mishaps.log import Log, Mishap, scaled, swapped, then
 from studies.scored.truth import Cause
 
-SPEED = r"speed|rpm|omega|rad/s|\bHz\b|turn"
-ANGLE = r"angle|degree|cycle|turn|theta|counts"
-ORDER = r"order|swap|exchange|rotat|phase|sequence"
-SIGN = r"sign|opposite|rotat|direction|angle_180|swapped|order|axes|phase"
+SPEED = r"rpm|omega_e|the speed (is|has|in)|unit of (the )?speed|angle against"
+ANGLE = r"(in|as) (degrees|turns|codes|revolutions|counts)|theta_e|of the shaft|angle (stands|against|stuck)"
+ORDER = r"\border\b|swapped|exchanged|rotates|sequence"
+SIGN = r"\bsign\b|opposite|rotates|direction|angle_180|swapped|axes|\border\b"
 OFFSET = {"offset_rad": (0.40, 0.47)}
 TWO_PI = 2.0 * np.pi
 
@@ -58,11 +58,11 @@ def _cyclic(log: Log):
 MISHAPS = (
     Mishap("speed in rpm", "dq", _rpm, readings=SPEED, limit=r"rpm"),
     Mishap("speed in rpm no angle", "dq", then(_rpm, lambda log: log.without("theta_e")), readings=SPEED,
-           limit=r"rpm|unit of"),
-    Mishap("speed in rpm of a slow log", "slow", _rpm, readings=SPEED, limit=r"rpm|unit of"),
-    Mishap("speed in rpm of a table", "table", _rpm, readings=SPEED, limit=r"rpm|unit of"),
+           limit=r"rpm|unit of", tells=SPEED),
+    Mishap("speed in rpm of a slow log", "slow", _rpm, readings=SPEED, limit=r"rpm|unit of", tells=SPEED),
+    Mishap("speed in rpm of a table", "table", _rpm, readings=SPEED, limit=r"rpm|unit of", tells=SPEED),
     Mishap("speed named n without unit", "slow", then(_rpm, lambda log: log.renamed(omega_e="n")), readings=SPEED,
-           limit=r"rpm|unit", never=r"'n' for omega_e(?!.*unit)"),
+           limit=r"rpm|unit", never=r"'n' for omega_e(?!.*unit)", tells=SPEED),
     Mishap("speed of the shaft", "dq", _shaft_speed, readings=SPEED, limit=SPEED),
     Mishap("speed of the shaft slow", "slow", _shaft_speed, readings=SPEED, limit=SPEED),
     Mishap("speed in hertz", "dq", scaled(1 / TWO_PI, "omega_e"), readings=SPEED, limit=SPEED),
@@ -90,7 +90,7 @@ MISHAPS = (
            limit=r"stuck|constant|stands"),
     Mishap("currents b and c swapped", "phases", swapped("i_b", "i_c"), readings=ORDER, limit=ORDER),
     Mishap("duties b and c swapped", "phases", swapped("d_b", "d_c"), readings=ORDER, limit=ORDER),
-    Mishap("currents in the order b c a", "phases", _cyclic, readings=f"{ORDER}|angle", limit=ORDER),
+    Mishap("currents in the order b c a", "phases", _cyclic, readings=f"{ORDER}|angle_(minus_)?120", limit=ORDER),
     Mishap("currents with the wrong sign", "phases", scaled(-1.0, "i_a", "i_b", "i_c"), readings=SIGN, limit=SIGN),
     Mishap("one current with the wrong sign", "phases", then(scaled(-1.0, "i_b"), lambda log: log.without("i_c")),
            readings=SIGN, limit=SIGN),

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +82,8 @@ class Log:
 class Mishap:
     """name; form of the recording; what it does to a Log; and of the truth: what it adds to that of the base.
 
-    may, may_read: as in Cause, of all causes.  ignored: the base's own cause cannot be seen any more.
+    may, reading, may_read: as in Cause, of the causes by which the drive file differs.
+    ignored: the base's own cause cannot be seen any more.
     """
 
     name: str
@@ -93,10 +94,11 @@ class Mishap:
     readings: str = ""
     limit: str = ""
     never: str = ""
+    tells: str = ""
     may: tuple[str, ...] = ()
+    reading: str = ""
     may_read: str = ""
     ignored: bool = False
-    of_machine: dict = field(default_factory=dict)  # {key: factor} by which the machine itself seems to be another
 
     def case(self, base: str) -> Case:
         """The mishap on one base."""
@@ -109,17 +111,17 @@ class Mishap:
         """Causes by which the machine differs from the drive file as it is written now, and those of the mishap."""
         causes, beside = [*self.causes], [*self.beside]
         for key, name in {} if self.ignored else KEYS.items():
-            true = BASES[base].value(key) * self.of_machine.get(key, 1.0)
+            true = BASES[base].value(key)
             stated = drive["machine"].get(key, true)
             off = abs(true - stated) / true
             sizes = {key: (true - ROOM * abs(true), true + ROOM * abs(true))}
             if off > SEEN:
-                causes.append(Cause((name,), sizes, may=self.may, may_read=self.may_read))
+                causes.append(Cause((name,), sizes, self.may, self.reading, self.may_read))
             elif off > EXACT:
                 beside.append(Cause((name,), sizes))
         if self.ignored:
             beside += [Cause((KEYS[key],)) for key in BASES[base].true]
-        return Truth(tuple(causes), tuple(beside), self.readings, self.limit, self.never)
+        return Truth(tuple(causes), tuple(beside), self.readings, self.limit, self.never, self.tells)
 
 
 def scaled(factor, *names):

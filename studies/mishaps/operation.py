@@ -99,7 +99,7 @@ MISHAPS = (
     Mishap("one direction only", "phases", _chosen(lambda w, c: w > 0.0), readings="gap"),
     Mishap("one speed only", "slow", _chosen(lambda w, c: np.abs(w) > 0.9 * np.abs(w).max())),
     Mishap("no load only", "slow", _chosen(lambda w, c: np.abs(c["i_q"]) < 0.05 * np.abs(c["i_q"]).max()),
-           beside=FEW, limit=r"current|load"),
+           beside=FEW, limit=r"without (load|current)|no load|no-load"),
     Mishap("one dwell only", "phases", _dwell, limit=r"one operating point|short|steady|longer"),
     Mishap("sixty rows", "phases", _short, limit=r"short|rows|steady|longer"),
     Mishap("the same log twice", "phases", _twice),

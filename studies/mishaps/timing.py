@@ -9,8 +9,11 @@ import pandas as pd
 from studies.mishaps.log import Log, Mishap, scaled, then
 from studies.mishaps.nameplate import TIMES
 
-UNIT = r"\bms\b|\bus\b|milli|micro|unit|sample.time|time"
-ORDER = r"time|order|backwards|gap|row"
+UNIT = r"unit of t\b|time (unit|column)|no time|in (ms|us)\b|milliseconds|sample_time_s|rows are assumed"
+TIME = r"time|\bt is\b|sample_time"  # of corrections
+ORDER = r"time (stamp|runs|does not|goes|jumps|wraps|restarts)|backwards|duplicate|order of"
+LOST = r"gaps? (at|of|from)|rows? (are |were )?(missing|lost)|lost rows|dropped"
+ROWS = r"time|rows?\b|repeat|held|duplicate|gap"  # of corrections
 START = pd.Timestamp("2026-11-20 10:00:00")
 
 
@@ -65,35 +68,36 @@ def _held(count):
 
 
 MISHAPS = (
-    Mishap("time in ms without unit", "phases", scaled(1e3, "t"), readings=UNIT, limit=UNIT),
-    Mishap("time in us without unit", "phases", scaled(1e6, "t"), readings=UNIT, limit=UNIT),
-    Mishap("time in ms of a slow log", "slow", scaled(1e3, "t"), readings=UNIT, limit=UNIT),
+    Mishap("time in ms without unit", "phases", scaled(1e3, "t"), readings=TIME, limit=UNIT),
+    Mishap("time in us without unit", "phases", scaled(1e6, "t"), readings=TIME, limit=UNIT),
+    Mishap("time in ms of a slow log", "slow", scaled(1e3, "t"), readings=TIME, limit=UNIT),
     Mishap("time named time_ms", "dq", then(scaled(1e3, "t"), lambda log: log.renamed(t="time_ms"))),
-    Mishap("time in us wraps", "dq", _wrapped, readings=ORDER, limit=ORDER),
-    Mishap("no time", "phases", lambda log: log.without("t"), readings=UNIT, limit=UNIT),
-    Mishap("no time in a slow log", "slow", lambda log: log.without("t"), readings=TIMES, limit=UNIT,
-           never="dead.time"),
+    Mishap("time in us wraps", "dq", _wrapped, readings=ROWS, limit=ORDER),
+    Mishap("no time", "phases", lambda log: log.without("t"), readings=TIME, limit=UNIT),
+    Mishap("no time in a slow log", "slow", lambda log: log.without("t"), readings=TIME, limit=UNIT,
+           tells=UNIT),
     Mishap("no time and no sample time", "dq", then(lambda log: log.without("t"),
-           lambda log: log.driven("control", sample_time_s=None)), readings=TIMES, limit=TIMES),
-    Mishap("time index without a name", "slow", _unnamed, readings=UNIT, limit=UNIT),
-    Mishap("time index without a name fast", "dq", _unnamed, readings=UNIT, limit=UNIT),
+           lambda log: log.driven("control", sample_time_s=None)), readings=TIME, limit=TIMES,
+           tells=TIMES),
+    Mishap("time index without a name", "slow", _unnamed, readings=TIME, limit=UNIT),
+    Mishap("time index without a name fast", "dq", _unnamed, readings=TIME, limit=UNIT),
     Mishap("time as dates", "slow", lambda log: log.having(t=_stamps(log).astype(str))),
     Mishap("time since 1970", "slow", lambda log: log.having(t=_t(log) + 1.7e9)),
     Mishap("time since 1970 in single precision", "slow",
-           lambda log: log.having(t=(_t(log) + 1.7e9).astype(np.float32).astype(float)), readings=ORDER, limit=ORDER),
-    Mishap("time rounded to ms", "phases", _coarse, readings=ORDER, limit=ORDER),
-    Mishap("clock restarts in the middle", "phases", _restarted, readings=ORDER, limit=ORDER),
-    Mishap("rows twice", "phases", lambda log: log.rows(np.repeat(np.arange(len(_t(log))), 2)), readings=ORDER,
+           lambda log: log.having(t=(_t(log) + 1.7e9).astype(np.float32).astype(float)), readings=ROWS, limit=ORDER),
+    Mishap("time rounded to ms", "phases", _coarse, readings=ROWS, limit=ORDER),
+    Mishap("clock restarts in the middle", "phases", _restarted, readings=ROWS, limit=ORDER),
+    Mishap("rows twice", "phases", lambda log: log.rows(np.repeat(np.arange(len(_t(log))), 2)), readings=ROWS,
            limit=r"twice|repeat|duplicate"),
     Mishap("rows twice in a slow log", "slow", lambda log: log.rows(np.repeat(np.arange(len(_t(log))), 2)),
-           readings=ORDER, limit=r"twice|repeat|duplicate"),
-    Mishap("one row in twenty lost", "phases", _keep(0.05), readings=ORDER, limit=r"gap|missing|lost|drop"),
-    Mishap("every seventh row lost", "dq", _every, readings=ORDER, limit=r"gap|missing|lost|drop"),
-    Mishap("rows in the wrong order", "phases", _swapped_rows, readings=ORDER, limit=ORDER),
+           readings=ROWS, limit=r"twice|repeat|duplicate"),
+    Mishap("one row in twenty lost", "phases", _keep(0.05), readings=ROWS, limit=LOST),
+    Mishap("every seventh row lost", "dq", _every, readings=ROWS, limit=LOST),
+    Mishap("rows in the wrong order", "phases", _swapped_rows, readings=ROWS, limit=ORDER),
     Mishap("values held for five rows", "dq", _held(5), readings=r"held|repeat", limit=r"held|repeat"),
     Mishap("every tenth row", "dq", lambda log: log.rows(slice(None, None, 10)), readings=r"sample|slow",
            limit=r"sample|slow|steady|short"),
     Mishap("noughts after the end", "phases",
            lambda log: log.having(**{n: np.append(v, np.zeros(800)) for n, v in log.columns.items()}),
-           readings=ORDER, limit=ORDER),
+           readings=ROWS, limit=ORDER),
 )  # fmt: skip

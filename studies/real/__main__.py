@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``make real``: diagnose and judge every available real recording; writes build/real/result.json, report.html, folders.
+"""``make real``: diagnose and judge every available real recording; writes build/real/result.json and report.html.
 
-The cases of truth.py are diagnosed as a user does and judged (studies/scored); three recordings are studied in depth
-besides (``--only NAME`` chooses cases or those).  The recordings are not part of the project: FLUXPROOF_RECORDINGS names their folder, ../shared/recordings without it.
+The cases of truth.py are diagnosed as a user does and judged (studies/scored), each with a folder of its own; three
+recordings are studied in depth besides.  The recordings are not part of the project: FLUXPROOF_RECORDINGS names their
+folder, ../shared/recordings without it.
 """
 
 from __future__ import annotations
@@ -78,6 +79,7 @@ def main(arguments=None) -> int:
         "--only", action="append", default=[], metavar="NAME", help=f"of {', '.join(PARTS)}, or a case of truth.py"
     )
     parser.add_argument("--jobs", type=int, default=2, help="diagnoses at once (default: 2)")
+    parser.add_argument("--again", action="store_true", help="judge the kept answers again, diagnose nothing")
     parser.add_argument("--out", type=Path, default=BUILD / "real")
     parser.add_argument("--quiet", action="store_true")
     args = parser.parse_args(arguments)
@@ -85,9 +87,9 @@ def main(arguments=None) -> int:
     unknown = sorted(set(chosen) - set(every))
     if unknown:
         parser.error(f"{unknown[0]} is not one of {', '.join(every)}")
-    result = {"schema": 1, "recordings": studied([n for n in PARTS if not chosen or n in chosen], args)}
+    result: dict = {"schema": 1, "recordings": studied([n for n in PARTS if not chosen or n in chosen], args)}
     cases = [c for c in CASES if not chosen or c.name in chosen]
-    result |= scored(cases, args.out / "cases", args.jobs, whole=True)
+    result |= scored(cases, args.out / "cases", args.jobs, whole=True, again=args.again)
     print_counts(result)
     write_page(result, args.out / "report.html", "Recordings of real drives and benches")
     print(write_json(args.out / "result.json", result))

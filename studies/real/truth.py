@@ -16,7 +16,8 @@ LOCKED = Truth((WARM_R,), text="resistance 0.37 of 0.28 ohm")
 DEPHY = Truth(
     (Cause(("resistance", "dead_time", "resistance_temperature"), WIDE, may=("current_scale", "udc_gain")),),
     (Cause(("magnet_flux",), {"magnet_flux_wb": (0.0042, 0.0050)}),),
-    text="resistance 0.28 to 0.37 ohm, rising with current: device and dead-time voltage, warm winding",
+    limit=r"time does not advance",
+    text="time of too few digits; resistance 0.28 to 0.37 ohm, rising with current: devices, dead time, warm winding",
 )
 TRIP = Truth(limit=r"gates? (were |was |are )?off|trip|switched off|fault", text="agrees until the gates are off")
 RPM_LIMIT = r"rpm|revolutions|1/min"
@@ -56,7 +57,7 @@ WARM = Truth(
 LATE = Truth(
     (Cause(("delay", "sampling_skew", "iron_loss"), words=r"\blate\b|delay|instant|iron loss"),),
     (Cause(("magnet_flux",), {"magnet_flux_wb": (0.0080, 0.0088)}), Cause(("dead_time",)), Cause(("resistance",))),
-    limit=r"(little|no|hardly any|without) (load|current)",
+    limit=r"(little|no|hardly any|without) (load|current)\b",
     never=r"from [-−]\d\d+ ?(degC|°C)",
     text="u_d = omega^2 psi 46 us: late voltage or angle, skew, or iron loss",
 )

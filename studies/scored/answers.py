@@ -53,12 +53,13 @@ def answer_of(job: Job) -> dict:
             answer = json.loads((job.out / "diagnosis.json").read_text())
             answer["improved"] = _improved(job.drive, job.out / "drive_improved.toml")
     except (RecordingError, DriveError) as error:
-        answer = {"refused": str(error).replace(f"{Path(job.recordings[0]).parent}/", "")}
+        answer = {"refused": str(error)}
     except Exception as error:  # the study counts exceptions and continues
         answer = {"crash": f"{type(error).__name__}: {error}", "trace": traceback.format_exc(limit=-4)}
     answer = {key: value for key, value in answer.items() if key not in LEFT_OUT}
     answer["seconds"] = round(time.process_time() - began, 2)
-    answer = json.loads(json.dumps(answer, default=float))
+    text = json.dumps(answer, default=float).replace(f"{Path(job.recordings[0]).parent}/", "")
+    answer = json.loads(text)
     write_json(job.kept, answer)
     return answer
 
@@ -82,3 +83,12 @@ def answers(jobs: list[Job], workers: int) -> Iterator[tuple[Job, dict]]:
         yield from ((job, answer_of(job)) for job in left)
     else:
         yield from in_parallel(answer_of, left, workers, "diagnosed")
+
+
+def kept_answers(jobs: list[Job]) -> Iterator[tuple[Job, dict]]:
+    """(job, newest answer that is kept), also of other code; without those that have none."""
+    for job in jobs:
+        name = job.kept.stem.rpartition("_")[0]
+        files = [p for p in job.kept.parent.glob("*.json") if p.stem.rpartition("_")[0] == name]
+        if files:
+            yield job, json.loads(max(files, key=lambda p: p.stat().st_mtime).read_text())

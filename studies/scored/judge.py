@@ -31,6 +31,8 @@ def judge(answer: dict, truth: Truth, machine: dict) -> tuple[str, str]:
     if "refused" in answer or answer["verdict"] == "bad_recording":
         return _refused(answer, truth, headline)
     faults = [*_false_effects(answer, truth, machine), *_false_groups(answer, truth), *_false_readings(answer, truth)]
+    if truth.tells and not re.search(truth.tells, headline, re.IGNORECASE):
+        faults.append("rests on a guess that the headline does not tell")
     if answer.get("improved") == "same" and CALLS_FOR_IT in answer["advice"]:
         faults.append("drive_improved.toml equals the given drive file")
     if faults:

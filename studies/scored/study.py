@@ -11,7 +11,7 @@ from jinja2 import Environment
 from fluxproof.files import write_text
 from golden_model.drive_file import read_tables
 from golden_model.drive_keys import DriveError
-from studies.scored.answers import Job, answers, job_of
+from studies.scored.answers import Job, answers, job_of, kept_answers
 from studies.scored.judge import headline_of, judge
 from studies.scored.truth import JUDGES, USEFUL, Case
 
@@ -29,10 +29,11 @@ table{border-collapse:collapse}td,th{border-bottom:1px solid #ddd;padding:.3em .
 """
 
 
-def scored(cases: list[Case], out: Path, workers: int, whole: bool) -> dict:
+def scored(cases: list[Case], out: Path, workers: int, whole: bool, again=False) -> dict:
     """{"cases": [{name, truth, answer, judge, why}], "counts", "useful"}, in the order of the cases.
 
-    whole: each answer with its report, in out/NAME.  A case without its recording is left out, and printed so.
+    whole: each answer with its report, in out/NAME.  again: judge the newest answers that are kept, also of other code,
+    and diagnose nothing.  A case without its recording, or then without its answer, is left out.
     """
     jobs: list[Job] = []
     for case in cases:
@@ -43,10 +44,10 @@ def scored(cases: list[Case], out: Path, workers: int, whole: bool) -> dict:
             continue
         jobs.append(job_of(case.name, recordings, drive, out / case.name if whole else None, out / "kept"))
     truths, found = {case.name: case.truth for case in cases}, {}
-    for job, answer in answers(jobs, workers):
+    for job, answer in kept_answers(jobs) if again else answers(jobs, workers):
         found[job.name] = entry = judged(job, answer, truths[job.name])
         print(f"{entry['judge']:13s} {job.name}: {entry['why']}", flush=True)
-    return summary([found[job.name] for job in jobs])
+    return summary([found[job.name] for job in jobs if job.name in found])
 
 
 def judged(job: Job, answer: dict, truth) -> dict:

@@ -39,6 +39,7 @@ class Truth:
     readings: regex of conventions and corrections that are right and need not be told.
     limit: regex of a message that names the true reason why this recording cannot be diagnosed.
     never: regex of a headline or advice that is wrong whatever else the answer says.
+    tells: regex that the headline of an answer must match, as time, speed or unit had to be guessed.
     """
 
     causes: tuple[Cause, ...] = ()
@@ -46,6 +47,7 @@ class Truth:
     readings: str = ""
     limit: str = ""
     never: str = ""
+    tells: str = ""
     text: str = ""
 
     def told(self) -> str:
