@@ -26,7 +26,7 @@ unexport PYTHONHOME
 
 PYTHON_RUN := .venv/bin/python
 
-.PHONY: help setup generate test slow demo papers bench blind fleet sensitivity real compare timeline mutate verilog synth ecp5 lint registers package prove faults board fuzz lock clean distclean
+.PHONY: help setup generate test slow demo papers bench blind fleet sensitivity real mishaps compare timeline mutate verilog synth ecp5 lint registers package prove faults board fuzz lock clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -70,9 +70,12 @@ fleet: setup ## measure the figures of `fluxproof fleet` on simulated fleets of 
 sensitivity: setup ## halve and double every constant of the inference and count the answers that change
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.sensitivity $(ARGS)
 
-real: setup ## diagnose the recordings of real drives
+real: setup ## diagnose and judge the recordings of real drives and benches (ARGS='--only trip --jobs 1')
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.real $(ARGS)
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m pytest -q -m study cocotb_tests/studies/test_real.py
+
+mishaps: setup ## diagnose and judge everyday mishaps of recordings on three simulated drives (ARGS='--only rpm --base servo')
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.mishaps $(ARGS)
 
 compare: setup ## diagnose the same cases with alternative methods
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.compare $(ARGS)

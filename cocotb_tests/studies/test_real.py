@@ -92,3 +92,4 @@ def test_absent_recordings_are_reported_without_failure(tmp_path, monkeypatch, c
     assert main(["--out", str(tmp_path), "--quiet"]) == 0
     result = json.loads((tmp_path / "result.json").read_text())
     assert all("skipped" in entry for entry in result["recordings"].values()) and len(result["recordings"]) == 3
+    assert result["cases"] == [] and sum(result["counts"].values()) == 0

@@ -37,10 +37,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Diagnose, write the outputs, print the answer; returns 0."""
+    check_inputs(args)
+    if not args.example:
+        from fluxproof.diagnosis.loading.early import refuse_early
+
+        refuse_early(args.recordings, args.drive)
     from fluxproof.diagnosis.ground.nominal import load_nominal
     from fluxproof.diagnosis.session import run as session
 
-    check_inputs(args)
     out = Path(args.out) if args.out else FOLDER / "example" if args.example else default_folder(args.recordings)
     with Progress(quiet=args.quiet) as progress:
         recordings, drive = make_example(out, progress) if args.example else (args.recordings, args.drive)

@@ -15,7 +15,7 @@ needs_of() {
         generate | registers | package) echo core report package ;;
         blind) echo run blind fleet ;;
         fleet) echo run fleet ;;
-        sensitivity) echo run fleet ;;
+        sensitivity | mishaps) echo run fleet ;;
         board) echo core run report sim test ghdl c++ ghdl5 ;;
         bench | fuzz) echo run test ;;
         real) echo run fleet test ;;

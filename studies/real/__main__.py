@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``make real``: diagnose every available real recording; writes build/real/result.json and a folder for each.
+"""``make real``: diagnose and judge every available real recording; writes build/real/result.json and report.html.
 
-The recordings are not part of the project: FLUXPROOF_RECORDINGS names their folder, ../shared/recordings without it.
+The cases of truth.py are diagnosed as a user does and judged (studies/scored), each with a folder of its own; three
+recordings are studied in depth besides.  The recordings are not part of the project: FLUXPROOF_RECORDINGS names their
+folder, ../shared/recordings without it.
 """
 
 from __future__ import annotations
@@ -20,6 +22,8 @@ from fluxproof.files import write_json
 from fluxproof.fleet.engine import in_parallel
 from fluxproof.fleet.work import version
 from studies.real import brusa, emrax, laas
+from studies.real.truth import CASES
+from studies.scored.study import print_counts, scored, write_page
 
 PARTS = {"brusa_flux_map": brusa, "emrax228": emrax, "laas_mn4004": laas}
 
@@ -54,24 +58,40 @@ def kept(chosen) -> Iterator[tuple[str, dict]]:
             yield name, json.loads(path.read_text())
 
 
+def studied(names, args) -> dict:
+    """{recording: entry} of the recordings that are studied in depth."""
+    chosen = [(name, recordings(), args.out, args.quiet) for name in names]
+    found = dict(kept(chosen))
+    left = [c for c in chosen if c[0] not in found]
+    for (name, *_), entry in in_parallel(part, left, args.jobs, "recordings"):
+        found[name] = entry
+    for name in names:
+        if "skipped" not in found[name]:
+            print(f"{name}: {found[name]['verdict']}. {found[name]['sentence']}")
+    return {name: found[name] for name in names}
+
+
 def main(arguments=None) -> int:
     parser = argparse.ArgumentParser(prog="python -m studies.real", description=__doc__.splitlines()[0])
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(PARTS)}; default: all")
+    every = [*PARTS, *(case.name for case in CASES)]
+    parser.add_argument("names", nargs="*", metavar="NAME", help="as --only; default: all")
+    parser.add_argument(
+        "--only", action="append", default=[], metavar="NAME", help=f"of {', '.join(PARTS)}, or a case of truth.py"
+    )
+    parser.add_argument("--jobs", type=int, default=2, help="diagnoses at once (default: 2)")
+    parser.add_argument("--again", action="store_true", help="judge the kept answers again, diagnose nothing")
     parser.add_argument("--out", type=Path, default=BUILD / "real")
     parser.add_argument("--quiet", action="store_true")
     args = parser.parse_args(arguments)
-    unknown = sorted(set(args.names) - set(PARTS))
+    chosen = [*args.names, *args.only]
+    unknown = sorted(set(chosen) - set(every))
     if unknown:
-        parser.error(f"{unknown[0]} is not one of {', '.join(PARTS)}")
-    folder, result = recordings(), {"schema": 1, "recordings": {}}
-    chosen = [(name, folder, args.out, args.quiet) for name in args.names or PARTS]
-    found = dict(kept(chosen))
-    for (name, *_), entry in in_parallel(part, [c for c in chosen if c[0] not in found], None, "recordings"):
-        found[name] = entry
-    for name, *_ in chosen:
-        entry = result["recordings"][name] = found[name]
-        if "skipped" not in entry:
-            print(f"{name}: {entry['verdict']}. {entry['sentence']}")
+        parser.error(f"{unknown[0]} is not one of {', '.join(every)}")
+    result: dict = {"schema": 1, "recordings": studied([n for n in PARTS if not chosen or n in chosen], args)}
+    cases = [c for c in CASES if not chosen or c.name in chosen]
+    result |= scored(cases, args.out / "cases", args.jobs, whole=True, again=args.again)
+    print_counts(result)
+    write_page(result, args.out / "report.html", "Recordings of real drives and benches")
     print(write_json(args.out / "result.json", result))
     return 0
 

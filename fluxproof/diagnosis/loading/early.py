@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What needs no diagnosis to be refused: a file that is missing, a text table without a column that is needed.
+
+A command asks here first, as the libraries of a diagnosis take seconds to import.  Messages are those of a complete
+run, which this module leaves to judge everything else; it imports NumPy and nothing that is larger.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+from fluxproof.diagnosis.ground.limits import head_of
+from fluxproof.diagnosis.ground.recording import RecordingError
+from fluxproof.diagnosis.ingest.columns import plan_columns
+from fluxproof.diagnosis.readers import text
+from fluxproof.diagnosis.readers.sniff import sniff
+from fluxproof.diagnosis.readers.table import chosen, repeated
+from fluxproof.quote import escaped
+from golden_model.drive_file import read_tables
+
+
+def refuse_early(recordings, drive) -> None:
+    """DriveError or RecordingError for input that no diagnosis can use, if that is seen at once; else nothing.
+
+    recordings, drive: paths.  Of several recordings one without its columns is left out and not refused.
+    """
+    tables = read_tables(drive)
+    for path in map(Path, recordings):
+        if not path.is_file():
+            head_of(path)
+    if len(recordings) == 1 and (nominal := _stand_in(tables, drive)) is not None:
+        _refuse_columns(Path(recordings[0]), nominal)
+
+
+def _stand_in(tables, drive):
+    """What the plan of the columns needs of a drive; None if the file's error is to be found by those who read it."""
+    machine, columns, constants = (tables.get(key, {}) for key in ("machine", "columns", "constants"))
+    if not all(isinstance(part, dict) for part in (machine, columns, constants)):
+        return None
+    pairs = machine.get("pole_pairs")
+    if not isinstance(pairs, int) or pairs < 1:
+        return None
+    return SimpleNamespace(
+        machine=SimpleNamespace(pole_pairs=pairs), columns=columns, constants=constants, path=str(drive)
+    )
+
+
+def _refuse_columns(path: Path, nominal) -> None:
+    """RecordingError if the header of a text table lacks a column."""
+    head = head_of(path)
+    if path.suffix.lower() not in text.SUFFIXES or not text.matches(head, path):
+        return
+    try:
+        layout = sniff(path)
+    except Exception:  # whatever it is, the reader says it in full
+        return
+    units = {name: unit for name, unit in zip(layout.names, layout.units, strict=True)}
+    try:
+        chosen(units, lambda names: plan_columns(names, nominal, path).wanted(), path, repeated(layout.names),
+               f":{layout.first}")  # fmt: skip
+    except RecordingError as error:
+        raise error if escaped(path) in str(error) else RecordingError(f"{path}: {error}") from None
+    except Exception:  # a value of [columns] of another type than a name or a table
+        return
