@@ -21,11 +21,13 @@ sample.  The bound is therefore the error of one sample, derived from the format
 
 ``step(*inputs, *registers, *generics)`` returns a tuple in the order of ``outputs``; a block with
 state has ``step(state, ...)`` and returns ``(state, outputs)``, state being a NamedTuple of integers.
+A block of many ports has ``step(inputs, regs, *generics)`` and ``takes``, the NamedTuples of both: the caller passes
+these, or any record that has fields of these names.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -87,6 +89,7 @@ class Block:
     reference: Callable | None  # float: (values, state) -> {output: value}
     bound: Callable | None  # (values, state) -> {output: largest |golden - reference|}
     registers: tuple[Port, ...] = ()
+    takes: tuple[Any, ...] = ()  # NamedTuples of the inputs and of the registers, if step takes them as records
     state: Any = None
     interval: int = 1
     clocked: bool = False
@@ -124,6 +127,13 @@ class Block:
             port = replace(port, fmt=size(config))
         return port
 
+    def grouped(self, values: Sequence[int]) -> list:
+        """What ``step`` takes, of the values of inputs and registers in the order of their declaration."""
+        if not self.takes:
+            return list(values)
+        rest = iter(values)
+        return [record(*(next(rest) for _ in record._fields)) for record in self.takes]
+
     def run(self, state, values: Mapping[str, int], config: Mapping[str, int]):
         """One sample by name: returns (next state, {output: integer})."""
         return self.runner(config)(state, values)
@@ -131,10 +141,10 @@ class Block:
     def runner(self, config: Mapping[str, int]) -> Callable:
         """``run`` with this configuration, for many samples: (state, {port: value}) -> (next state, outputs)."""
         ports, outputs = [p.name for p in self.inputs + self.registers], [p.name for p in self.outputs]
-        generics, step, stateless = list(config.values()), self.step, self.state is None
+        generics, step, stateless, grouped = list(config.values()), self.step, self.state is None, self.grouped
 
         def run(state, values):
-            args = [*[values[name] for name in ports], *generics]
+            args = [*grouped([values[name] for name in ports]), *generics]
             if stateless:
                 result = step(*args)
             else:

@@ -115,19 +115,28 @@ def step(state, inputs, regs, carrier_half):
         )
     )
     following = State(
-        guard_state, host_state, latch_state, gate_state, sample_busy, sample_early, sample_late, host_lost,
-        sample_trigger, fault_stop, gate_clear,
-    )  # fmt: skip
+        of_sample_guard=guard_state,
+        of_host_watch=host_state,
+        of_fault_latch=latch_state,
+        of_gate_generation=gate_state,
+        sample_busy=sample_busy,
+        sample_early=sample_early,
+        sample_late=sample_late,
+        host_lost=host_lost,
+        period=sample_trigger,
+        fault_stop=fault_stop,
+        gate_clear=gate_clear,
+    )
     seen = Seen(
-        gate_high,
-        gate_low,
-        sample_trigger,
-        running,
-        tripped,
-        fault_flags,
-        first_fault,
-        early_samples,
-        setting_refused,
-        1 if x.brake_asked and not s.sample_late else 0,
+        gate_high=gate_high,
+        gate_low=gate_low,
+        sample_trigger=sample_trigger,
+        running=running,
+        tripped=tripped,
+        fault_flags=fault_flags,
+        first_fault=first_fault,
+        early_samples=early_samples,
+        setting_refused=setting_refused,
+        brake=1 if x.brake_asked and not s.sample_late else 0,
     )
     return following, entered, seen

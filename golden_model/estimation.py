@@ -125,11 +125,13 @@ class Estimated(NamedTuple):
 @kernel
 def kept(state):
     """The estimators' part of fluxproof.State as it is."""
+    s = state
     return State(
-        state.of_flux_merge, state.of_delta_lambda, state.of_flux_compensation, state.of_flux_monitor,
-        state.of_v_dead_adaline, state.of_psi_adaline, state.of_clean_voltage, state.lambda_m_alpha,
-        state.lambda_m_beta, state.merge_known, state.lambda_pi_d, state.lambda_pi_q, state.lambda_add_d,
-        state.lambda_add_q, state.v_comp, state.v_leg, state.s_alpha, state.s_beta,
+        of_flux_merge=s.of_flux_merge, of_delta_lambda=s.of_delta_lambda, of_flux_compensation=s.of_flux_compensation,
+        of_flux_monitor=s.of_flux_monitor, of_v_dead_adaline=s.of_v_dead_adaline, of_psi_adaline=s.of_psi_adaline,
+        of_clean_voltage=s.of_clean_voltage, lambda_m_alpha=s.lambda_m_alpha, lambda_m_beta=s.lambda_m_beta,
+        merge_known=s.merge_known, lambda_pi_d=s.lambda_pi_d, lambda_pi_q=s.lambda_pi_q, lambda_add_d=s.lambda_add_d,
+        lambda_add_q=s.lambda_add_q, v_comp=s.v_comp, v_leg=s.v_leg, s_alpha=s.s_alpha, s_beta=s.s_beta,
     )  # fmt: skip
 
 
@@ -144,7 +146,10 @@ def for_control(state, sample, regs, cos_theta, sin_theta, cos_out, sin_out):
     u_comp_alpha, u_comp_beta = dead_time_compensation.step(state.v_comp, state.s_alpha, state.s_beta)
     u_comp_d, u_comp_q = park.step(u_comp_alpha, u_comp_beta, cos_out, sin_out)
     d_d, d_q = park.step(state.s_alpha, state.s_beta, cos_out, sin_out)
-    return ForControl(winding_r, rho, minus_rho, temp_lost, lambda_m_d, lambda_m_q, u_comp_d, u_comp_q, d_d, d_q)
+    return ForControl(
+        r=winding_r, rho=rho, minus_rho=minus_rho, temp_lost=temp_lost, lambda_m_d=lambda_m_d, lambda_m_q=lambda_m_q,
+        u_comp_d=u_comp_d, u_comp_q=u_comp_q, d_d=d_d, d_q=d_q,
+    )  # fmt: skip
 
 
 @kernel
@@ -163,13 +168,22 @@ def step(state, given, seen, sample, regs, carrier_half):
     )
     lambda_c_alpha, lambda_c_beta = flux_inverse_park.step(lambda_c_d, lambda_c_q, v.cos_theta, v.sin_theta)
     merge_state, (lambda_m_alpha, lambda_m_beta, merge_known, merge_limited) = flux_merge.step(
-        state.of_flux_merge, v.i_alpha, v.i_beta, lambda_c_alpha, lambda_c_beta, u_clean_alpha, u_clean_beta,
-        voltage_known, x.run, g.rho, r.omega_0, r.xi, r.t_s,
+        state.of_flux_merge,
+        flux_merge.Inputs(
+            i_alpha=v.i_alpha, i_beta=v.i_beta, lambda_c_alpha=lambda_c_alpha, lambda_c_beta=lambda_c_beta,
+            u_applied_alpha=u_clean_alpha, u_applied_beta=u_clean_beta, voltage_known=voltage_known, run=x.run,
+            rho=g.rho,
+        ),
+        r,
     )  # fmt: skip
     factor, n_omega = speed_reciprocal.step(v.omega_me, r.omega_min, r.k_ramp)
     delta_state, (delta_lambda_d, delta_lambda_q, delta_held, delta_limited) = delta_lambda.step(
-        state.of_delta_lambda, v.u_int_d, v.u_int_q, v.i_d, v.i_q, v.sat_d, v.sat_q, v.current_at_rail,
-        voltage_known, x.run, factor, n_omega, g.r,
+        state.of_delta_lambda,
+        delta_lambda.Inputs(
+            u_int_d=v.u_int_d, u_int_q=v.u_int_q, i_d=v.i_d, i_q=v.i_q, sat_d=v.sat_d, sat_q=v.sat_q,
+            current_at_rail=v.current_at_rail, voltage_known=voltage_known, run=x.run, factor=factor,
+            n_omega=n_omega, r=g.r,
+        ),
     )  # fmt: skip
     compensation_state, compensated = flux_compensation.step(
         state.of_flux_compensation, delta_lambda_d, delta_lambda_q, delta_held, r.flux_mode, r.flux_kp, r.flux_ki,
@@ -182,21 +196,34 @@ def step(state, given, seen, sample, regs, carrier_half):
         delta_limited, compensation_limited, v.estimate_limited, x.clear_faults,
     )  # fmt: skip
     v_dead_state, (v_dead, v_comp, v_leg, v_comp_limited) = v_dead_adaline.step(
-        state.of_v_dead_adaline, v.u_pi_d, g.d_d, v.i_d, v.i_q, v.sat_d, v.sat_q, v.current_at_rail, voltage_known,
-        x.run, r.k_lp, r.eta_v, r.gamma, r.zeta, r.v_thr, r.v_comp_max, r.i_learn, r.compensate,
+        state.of_v_dead_adaline,
+        v_dead_adaline.Inputs(
+            u_pi_d=v.u_pi_d, d_d=g.d_d, i_d=v.i_d, i_q=v.i_q, sat_d=v.sat_d, sat_q=v.sat_q,
+            current_at_rail=v.current_at_rail, voltage_known=voltage_known, run=x.run,
+        ),
+        r,
     )  # fmt: skip
     psi_state, (psi_m, psi_held) = psi_adaline.step(
-        state.of_psi_adaline, v.u_q, g.d_q, state.v_leg, v.i_d, v.i_q, g.r, v.omega_chord, v.sat_d, v.sat_q,
-        v.current_at_rail, voltage_known, x.run, r.l_d, r.eta_psi, r.omega_psi_min,
+        state.of_psi_adaline,
+        psi_adaline.Inputs(
+            u_q=v.u_q, d_q=g.d_q, v_leg=state.v_leg, i_d=v.i_d, i_q=v.i_q, r=g.r, omega_chord=v.omega_chord,
+            sat_d=v.sat_d, sat_q=v.sat_q, current_at_rail=v.current_at_rail, voltage_known=voltage_known, run=x.run,
+        ),
+        r,
     )  # fmt: skip
 
     following = State(
-        merge_state, delta_state, compensation_state, monitor_state, v_dead_state, psi_state, clean_state,
-        lambda_m_alpha, lambda_m_beta, merge_known, lambda_pi_d, lambda_pi_q, lambda_add_d, lambda_add_q, v_comp, v_leg,
-        s_alpha, s_beta,
+        of_flux_merge=merge_state, of_delta_lambda=delta_state, of_flux_compensation=compensation_state,
+        of_flux_monitor=monitor_state, of_v_dead_adaline=v_dead_state, of_psi_adaline=psi_state,
+        of_clean_voltage=clean_state, lambda_m_alpha=lambda_m_alpha, lambda_m_beta=lambda_m_beta,
+        merge_known=merge_known, lambda_pi_d=lambda_pi_d, lambda_pi_q=lambda_pi_q, lambda_add_d=lambda_add_d,
+        lambda_add_q=lambda_add_q, v_comp=v_comp, v_leg=v_leg, s_alpha=s_alpha, s_beta=s_beta,
     )  # fmt: skip
     return following, Estimated(
-        g.u_comp_d, g.u_comp_q, u_applied_alpha, u_applied_beta, lambda_c_d, lambda_c_q, lambda_m_alpha,
-        lambda_m_beta, merge_known, delta_lambda_d, delta_lambda_q, delta_held, lambda_pi_d, lambda_pi_q, torque_me,
-        flux_faults, g.d_d, g.d_q, v_dead, v_comp, v_comp_limited, psi_m, psi_held, g.temp_lost,
+        u_comp_d=g.u_comp_d, u_comp_q=g.u_comp_q, u_applied_alpha=u_applied_alpha, u_applied_beta=u_applied_beta,
+        lambda_c_d=lambda_c_d, lambda_c_q=lambda_c_q, lambda_m_alpha=lambda_m_alpha, lambda_m_beta=lambda_m_beta,
+        merge_known=merge_known, delta_lambda_d=delta_lambda_d, delta_lambda_q=delta_lambda_q, delta_held=delta_held,
+        lambda_pi_d=lambda_pi_d, lambda_pi_q=lambda_pi_q, torque=torque_me, flux_faults=flux_faults, d_d=g.d_d,
+        d_q=g.d_q, v_dead=v_dead, v_comp=v_comp, v_comp_limited=v_comp_limited, psi_m=psi_m, psi_held=psi_held,
+        temp_lost=g.temp_lost,
     )  # fmt: skip

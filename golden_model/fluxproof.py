@@ -185,6 +185,16 @@ class Sample(NamedTuple):
     run: int
 
 
+@kernel
+def sample_of(row):
+    """The Sample whose fields are the columns of ``row`` (13,), in their order."""
+    return Sample(
+        adc_a=row[0], adc_b=row[1], adc_c=row[2], adc_u_dc=row[3], position_code=row[4], omega_ref=row[5],
+        i_d_ref=row[6], i_q_ext=row[7], speed_mode=row[8], temp_winding=row[9], temp_valid=row[10],
+        clear_faults=row[11], run=row[12],
+    )  # fmt: skip
+
+
 class State(NamedTuple):
     of_speed: speed.State = speed.State()
     of_current_limit: current_limit.State = current_limit.State()
@@ -311,7 +321,9 @@ class Given(NamedTuple):
 @kernel
 def step(state, sample, regs, config):
     """One control period: (next state, Observed)."""
-    given = Given(regs.speed_given, regs.omega_given, regs.position_restart)
+    given = Given(
+        speed_given=regs.speed_given, omega_given=regs.omega_given, position_restart=regs.position_restart
+    )  # fmt: skip
     return step_given(state, sample, regs, config, given)
 
 
@@ -370,16 +382,26 @@ def step_given(state, sample, regs, config, of_speed):
     after, e = estimation.kept(state), NOTHING_ESTIMATED
     if c.estimators:
         seen = estimation.Seen(
-            i_alpha, i_beta, i_d, i_q, current_at_rail, u_dc, u_dc_at_rail, u_dc_low, omega_me, omega_chord, cos_theta,
-            sin_theta, model_d, model_q, lambda_d, lambda_q, estimate_limited, u_pi_d, u_int_d,
-            u_int_q, u_q, sat_d, sat_q,
+            i_alpha=i_alpha, i_beta=i_beta, i_d=i_d, i_q=i_q, current_at_rail=current_at_rail, u_dc=u_dc,
+            u_dc_at_rail=u_dc_at_rail, u_dc_low=u_dc_low, omega_me=omega_me, omega_chord=omega_chord,
+            cos_theta=cos_theta, sin_theta=sin_theta, model_d=model_d, model_q=model_q, lambda_d=lambda_d,
+            lambda_q=lambda_q, estimate_limited=estimate_limited, u_pi_d=u_pi_d, u_int_d=u_int_d, u_int_q=u_int_q,
+            u_q=u_q, sat_d=sat_d, sat_q=sat_q,
         )  # fmt: skip
         after, e = estimation.step(state, given, seen, x, r, c.carrier_half)
 
     checks_state, (sample_faults, sample_trip) = sample_checks.step(
-        state.of_sample_checks, i_a, i_b, i_c, current_at_rail, u_dc, u_dc_at_rail, x.position_code, r.i_trip,
-        r.sum_trip, r.rail_samples, r.u_dc_min, r.u_dc_max, r.jump_max, r.fault_ignore,
-        of_speed.position_restart, c.position_bits,
+        state.of_sample_checks,
+        sample_checks.Inputs(
+            i_a=i_a, i_b=i_b, i_c=i_c, current_at_rail=current_at_rail, u_dc=u_dc, u_dc_at_rail=u_dc_at_rail,
+            code_theta=x.position_code,
+        ),
+        sample_checks.Registers(
+            i_trip=r.i_trip, sum_trip=r.sum_trip, rail_samples=r.rail_samples, u_dc_min=r.u_dc_min,
+            u_dc_max=r.u_dc_max, jump_max=r.jump_max, fault_ignore=r.fault_ignore,
+            position_restart=of_speed.position_restart,
+        ),
+        c.position_bits,
     )  # fmt: skip
     offset_check_state, (current_offset,) = offset_check.step(
         state.of_offset_check, i_a, i_b, i_c, omega_me, x.run, r.omega_stall, r.offset_max
@@ -394,22 +416,34 @@ def step_given(state, sample, regs, config, of_speed):
     brake_chopper_state, (brake_asked,) = brake_chopper.step(state.of_brake_chopper, u_dc, r.brake_on, r.brake_off)
 
     following = State(
-        speed_state, current_limit_state, speed_pi_state, current_pi_state, voltage_limit_state, after.of_flux_merge,
-        after.of_delta_lambda, after.of_flux_compensation, after.of_flux_monitor, after.of_v_dead_adaline,
-        after.of_psi_adaline, after.of_clean_voltage, checks_state, offset_check_state, motion_checks_state,
-        load_check_state, brake_chopper_state, sat_d, sat_q, compare_a, compare_b, compare_c, after.lambda_m_alpha,
-        after.lambda_m_beta, after.merge_known, after.lambda_pi_d, after.lambda_pi_q, after.lambda_add_d,
-        after.lambda_add_q, after.v_comp, after.v_leg, after.s_alpha, after.s_beta,
+        of_speed=speed_state, of_current_limit=current_limit_state, of_speed_pi=speed_pi_state,
+        of_current_pi=current_pi_state, of_voltage_limit=voltage_limit_state, of_flux_merge=after.of_flux_merge,
+        of_delta_lambda=after.of_delta_lambda, of_flux_compensation=after.of_flux_compensation,
+        of_flux_monitor=after.of_flux_monitor, of_v_dead_adaline=after.of_v_dead_adaline,
+        of_psi_adaline=after.of_psi_adaline, of_clean_voltage=after.of_clean_voltage, of_sample_checks=checks_state,
+        of_offset_check=offset_check_state, of_motion_checks=motion_checks_state, of_load_check=load_check_state,
+        of_brake_chopper=brake_chopper_state, sat_d=sat_d, sat_q=sat_q, compare_a=compare_a, compare_b=compare_b,
+        compare_c=compare_c, lambda_m_alpha=after.lambda_m_alpha, lambda_m_beta=after.lambda_m_beta,
+        merge_known=after.merge_known, lambda_pi_d=after.lambda_pi_d, lambda_pi_q=after.lambda_pi_q,
+        lambda_add_d=after.lambda_add_d, lambda_add_q=after.lambda_add_q, v_comp=after.v_comp, v_leg=after.v_leg,
+        s_alpha=after.s_alpha, s_beta=after.s_beta,
     )  # fmt: skip
     return following, Observed(
-        i_a, i_b, i_c, current_at_rail, u_dc, u_max, u_dc_at_rail, u_dc_low, theta_me, omega_me, i_d, i_q,
-        i_q_ref, speed_limited, lambda_d, lambda_q, omega_chord, u_dec_d, u_dec_q, e.u_comp_d, e.u_comp_q, u_int_d,
-        u_int_q, u_d, u_q, sat_d, sat_q, u_alpha, u_beta, duty_a, duty_b, duty_c, e.u_applied_alpha,
-        e.u_applied_beta, e.lambda_c_d, e.lambda_c_q, e.lambda_m_alpha, e.lambda_m_beta, e.merge_known,
-        e.delta_lambda_d, e.delta_lambda_q, e.delta_held, e.lambda_pi_d, e.lambda_pi_q, e.torque, e.flux_faults, e.d_d,
-        e.d_q, e.v_dead, e.v_comp, e.v_comp_limited, e.psi_m, e.psi_held, e.temp_lost, sample_faults, sample_trip,
-        current_offset, motion_faults, open_load, brake_asked, speed_was_given, position_restarted, x.adc_a, x.adc_b,
-        x.adc_c, x.adc_u_dc, x.position_code, compare_a, compare_b, compare_c,
+        i_a=i_a, i_b=i_b, i_c=i_c, current_at_rail=current_at_rail, u_dc=u_dc, u_max=u_max, u_dc_at_rail=u_dc_at_rail,
+        u_dc_low=u_dc_low, theta_me=theta_me, omega_me=omega_me, i_d=i_d, i_q=i_q, i_q_ref=i_q_ref,
+        speed_limited=speed_limited, lambda_d=lambda_d, lambda_q=lambda_q, omega_chord=omega_chord, u_dec_d=u_dec_d,
+        u_dec_q=u_dec_q, u_comp_d=e.u_comp_d, u_comp_q=e.u_comp_q, u_int_d=u_int_d, u_int_q=u_int_q, u_d=u_d, u_q=u_q,
+        sat_d=sat_d, sat_q=sat_q, u_alpha=u_alpha, u_beta=u_beta, duty_a=duty_a, duty_b=duty_b, duty_c=duty_c,
+        u_applied_alpha=e.u_applied_alpha, u_applied_beta=e.u_applied_beta, lambda_c_d=e.lambda_c_d,
+        lambda_c_q=e.lambda_c_q, lambda_m_alpha=e.lambda_m_alpha, lambda_m_beta=e.lambda_m_beta,
+        merge_known=e.merge_known, delta_lambda_d=e.delta_lambda_d, delta_lambda_q=e.delta_lambda_q,
+        delta_held=e.delta_held, lambda_pi_d=e.lambda_pi_d, lambda_pi_q=e.lambda_pi_q, torque=e.torque,
+        flux_faults=e.flux_faults, d_d=e.d_d, d_q=e.d_q, v_dead=e.v_dead, v_comp=e.v_comp,
+        v_comp_limited=e.v_comp_limited, psi_m=e.psi_m, psi_held=e.psi_held, temp_lost=e.temp_lost,
+        sample_faults=sample_faults, sample_trip=sample_trip, current_offset=current_offset,
+        motion_faults=motion_faults, open_load=open_load, brake_asked=brake_asked, speed_was_given=speed_was_given,
+        position_restarted=position_restarted, code_a=x.adc_a, code_b=x.adc_b, code_c=x.adc_c, code_u_dc=x.adc_u_dc,
+        code_theta=x.position_code, compare_a=compare_a, compare_b=compare_b, compare_c=compare_c,
     )  # fmt: skip
 
 

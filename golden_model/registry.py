@@ -1,181 +1,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every block of the core, one line each: add yours here and the bench finds it."""
+"""Every block of the core by its name: the BLOCK of each file golden_model/ROOM/NAME.py, in alphabetical order."""
 
-from golden_model.common import input_filter, multiply_add, packet_fifo, reciprocal, sqrt, sum_of_products
-from golden_model.control import (
-    chord_speed,
-    current_limit,
-    current_pi,
-    dead_time_compensation,
-    decoupling,
-    speed_pi,
-    voltage_limit,
-)
-from golden_model.converters import (
-    current_front,
-    delta_sigma,
-    modulator_input,
-    sinc3,
-    sinc_overcurrent,
-    spi_converter,
-    spi_frame,
-    spi_words,
-    third_current,
-    xadc_reader,
-)
-from golden_model.encoders import (
-    biss_master,
-    edge_timer,
-    endat_master,
-    forced_position,
-    hall_decoder,
-    hall_front,
-    incremental_encoder,
-    index_check,
-    position_bridge,
-    position_front,
-    quadrature_decoder,
-    serial_encoder,
-    ssi_master,
-    turn_counter,
-)
-from golden_model.estimators import (
-    applied_voltage,
-    clean_voltage,
-    current_directions,
-    current_model,
-    delta_lambda,
-    flux_compensation,
-    flux_estimate,
-    flux_merge,
-    flux_models,
-    flux_monitor,
-    psi_adaline,
-    speed_reciprocal,
-    torque,
-    v_dead_adaline,
-    winding_resistance,
-)
-from golden_model.io import (
-    board_faults,
-    board_snapshot,
-    brake_chopper,
-    current_conditioning,
-    fault_latch,
-    host_watch,
-    interrupts,
-    load_check,
-    motion_checks,
-    offset_check,
-    position,
-    sample_checks,
-    sample_guard,
-    sample_join,
-    sample_latch,
-    speed,
-    telemetry,
-    telemetry_words,
-    u_dc_conditioning,
-    u_dc_processing,
-)
-from golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
-from golden_model.transforms import (
-    clarke,
-    flux_inverse_park,
-    flux_park,
-    flux_rotate,
-    inverse_park,
-    park,
-    rotate,
-    sincos,
-)
+from importlib import import_module
+from pkgutil import iter_modules
 
-BLOCKS = {
-    module.BLOCK.name: module.BLOCK
-    for module in (
-        multiply_add,
-        sum_of_products,
-        sqrt,
-        reciprocal,
-        sample_latch,
-        current_conditioning,
-        position,
-        speed,
-        u_dc_conditioning,
-        u_dc_processing,
-        clarke,
-        sincos,
-        rotate,
-        park,
-        current_limit,
-        speed_pi,
-        current_pi,
-        chord_speed,
-        decoupling,
-        voltage_limit,
-        svm_delay_compensation,
-        inverse_park,
-        svm,
-        pwm_compare,
-        gate_generation,
-        winding_resistance,
-        applied_voltage,
-        current_model,
-        flux_rotate,
-        flux_inverse_park,
-        flux_merge,
-        flux_park,
-        flux_models,
-        flux_estimate,
-        speed_reciprocal,
-        delta_lambda,
-        flux_compensation,
-        torque,
-        flux_monitor,
-        current_directions,
-        dead_time_compensation,
-        clean_voltage,
-        v_dead_adaline,
-        psi_adaline,
-        packet_fifo,
-        telemetry_words,
-        telemetry,
-        sample_guard,
-        sample_checks,
-        motion_checks,
-        load_check,
-        offset_check,
-        brake_chopper,
-        host_watch,
-        fault_latch,
-        interrupts,
-        spi_frame,
-        spi_words,
-        spi_converter,
-        modulator_input,
-        sinc3,
-        sinc_overcurrent,
-        third_current,
-        xadc_reader,
-        input_filter,
-        quadrature_decoder,
-        turn_counter,
-        index_check,
-        edge_timer,
-        hall_decoder,
-        incremental_encoder,
-        ssi_master,
-        biss_master,
-        endat_master,
-        position_bridge,
-        serial_encoder,
-        hall_front,
-        position_front,
-        delta_sigma,
-        current_front,
-        forced_position,
-        sample_join,
-        board_faults,
-        board_snapshot,
-    )
-}
+import golden_model
+from golden_model.block import Block
+
+
+def found() -> dict[str, Block]:
+    """{name: block} of all rooms; ValueError for a block that declares another place than that of its file."""
+    blocks = {}
+    for room in [module.name for module in iter_modules(golden_model.__path__) if module.ispkg]:
+        for file in iter_modules(import_module(f"golden_model.{room}").__path__):
+            block = getattr(import_module(f"golden_model.{room}.{file.name}"), "BLOCK", None)
+            if block is None:
+                continue
+            if (block.folder, block.name) != (room, file.name):
+                declared = f'folder = "{block.folder}" and name = "{block.name}"'
+                raise ValueError(
+                    f"golden_model/{room}/{file.name}.py: BLOCK declares {declared}, not those of its file"
+                )
+            blocks[block.name] = block
+    return blocks
+
+
+BLOCKS = found()

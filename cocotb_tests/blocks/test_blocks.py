@@ -3,15 +3,19 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import re
+import sys
 
 import numpy as np
 import pytest
 
+import golden_model
 from fluxproof.checkout import ROOT, RTL
 from fluxproof.cosim import bench_plan, ghdl
 from fluxproof.cosim.stimulus import MEDIUM, samples
+from golden_model import registry
 from golden_model.registry import BLOCKS
 
 SEED = int(os.environ.get("FLUXPROOF_SEED", "1"))
@@ -74,15 +78,48 @@ def test_every_entity_has_a_model():
             continue
         assert entities == [path.stem], f"{path.name} must hold the one entity {path.stem}"
         if path.stem not in WITHOUT_MODEL:
-            assert path.stem in BLOCKS, f"{path.stem} has no model in golden_model/registry.py"
+            assert path.stem in BLOCKS, (
+                f"{path.stem} has no model golden_model/{path.parent.name}/{path.stem}.py with a BLOCK"
+            )
             assert BLOCKS[path.stem].vhdl == f"{path.parent.name}/{path.name}", f"{path.name} is in the wrong folder"
 
 
 def test_models_mirror_the_rtl():
-    golden = ROOT / "golden_model"
     for block in BLOCKS.values():
-        assert (golden / block.folder / f"{block.name}.py").exists()
         assert (RTL / block.vhdl).exists()
+
+
+def test_a_step_takes_its_ports():
+    """By position or in records, in the order of the declaration, as the bench and the callers read it."""
+    for block in BLOCKS.values():
+        ports = [p.name for p in block.inputs + block.registers]
+        if block.takes:
+            assert [name for record in block.takes for name in record._fields] == ports, block.name
+            ports = ["inputs", "regs"][: len(block.takes)]
+        parameters = inspect.signature(getattr(block.step, "py_func", block.step)).parameters.values()
+        named = [p.name for p in parameters if p.kind is not p.VAR_POSITIONAL][0 if block.state is None else 1 :]
+        if any(p.kind is p.VAR_POSITIONAL for p in parameters):  # the rest as *values
+            ports = ports[: len(named)]
+        assert named[: len(ports)] == ports, block.name
+
+
+@pytest.mark.parametrize("declared", ["fresh", "stale"])
+def test_a_file_in_a_room_is_a_block(declared, tmp_path, monkeypatch):
+    """A block is registered by its file; one that declares another name than its file's is refused by name."""
+    room = tmp_path / "attic"
+    room.mkdir()
+    (room / "__init__.py").touch()
+    (room / "helper.py").write_text("NOTHING = 0\n")
+    block = f'Block("{declared}", "attic", "none", None, (), (), 1, None, None)'
+    (room / "fresh.py").write_text(f"from golden_model.block import Block\n\nBLOCK = {block}\n")
+    monkeypatch.setattr(golden_model, "__path__", [*golden_model.__path__, str(tmp_path)])
+    for name in ("golden_model.attic", "golden_model.attic.fresh", "golden_model.attic.helper"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    if declared == "stale":
+        with pytest.raises(ValueError, match=r"attic/fresh\.py: BLOCK declares .*stale"):
+            registry.found()
+    else:
+        assert set(registry.found()) == {*BLOCKS, "fresh"}
 
 
 def test_sincos_at_every_angle():

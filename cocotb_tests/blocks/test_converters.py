@@ -87,7 +87,7 @@ def check_spi(core, adc_bits, given, answers, regs):
     core.reset()
     names = [p.name for p in spi_converter.BLOCK.inputs]
     seen = core.play(dict(zip(names, given.T, strict=True)), outputs_of(spi_converter))
-    order = tuple(regs[p.name] for p in spi_converter.BLOCK.registers)
+    order = spi_converter.Registers(**regs)
     wanted = golden_converters.spi(spi_converter.State(), *np.ascontiguousarray(given.T), order, adc_bits, LINES)
     assert np.array_equal(wanted, seen), np.argwhere(wanted != seen)[:3]
     codes = seen[seen[:, 3] == 1][:, 6:]
@@ -169,7 +169,7 @@ def check_xadc(core, given, answers, regs, sign=0):
     core.reset()
     names = [p.name for p in xadc_reader.BLOCK.inputs]
     seen = core.play(dict(zip(names, given.T, strict=True)), outputs_of(xadc_reader))
-    order = tuple(regs[p.name] for p in xadc_reader.BLOCK.registers)
+    order = xadc_reader.Registers(**regs)
     assert np.array_equal(golden_converters.xadc(xadc_reader.State(), given, order, 12), seen)
     codes = seen[seen[:, 3] == 1][:, 5:]
     held = [h for h in answers if h is not None]

@@ -17,6 +17,11 @@ from golden_model.registers import registers
 from studies.papers.flux_bench import scaled
 from studies.papers.vsi_bench import DRIVE, FAST, I_Q, NOMINAL, held_at, last, leg_loss, run, without
 
+# A sample in which nothing holds the Adalines
+CALM = v_dead_adaline.Inputs(
+    u_pi_d=0, d_d=0, i_d=0, i_q=0, sat_d=0, sat_q=0, current_at_rail=0, voltage_known=1, run=1
+)  # fmt: skip
+
 
 def real_v_dead(rows: np.ndarray, gains: dict[str, float]) -> tuple[float, float]:
     """The Adaline of V_dead in real numbers over recorded u_pi_d, d_d: (v_dead, v_comp) at the end."""
@@ -38,9 +43,8 @@ def test_one_lsb_of_v_dead():
     block = v_dead_adaline.BLOCK
     gains = {p.name: p.fmt.to_float(getattr(values, p.name)) for p in block.registers}
     state, out = v_dead_adaline.State(), None
-    regs = [getattr(values, p.name) for p in block.registers]
     for u, d in zip(u_pi_d, seen["d_d"], strict=True):
-        state, out = v_dead_adaline.step(state, int(u), int(d), 0, 0, 0, 0, 0, 1, 1, *regs)
+        state, out = v_dead_adaline.step(state, CALM._replace(u_pi_d=int(u), d_d=int(d)), values)
     rows = np.stack([u_pi_d, seen["d_d"]], axis=1) * 2.0**-16
     v_dead, v_comp = real_v_dead(rows, gains)
     lsb = 2.0**-18
@@ -57,7 +61,7 @@ def test_v_dead_never_stalls(eta):
     regs |= {"i_learn": 0, "compensate": 0}
     state = v_dead_adaline.State()
     for _ in range(2000):
-        state, _out = v_dead_adaline.step(state, 1, 43690, 0, 0, 0, 0, 0, 1, 1, *regs.values())
+        state, _out = v_dead_adaline.step(state, CALM._replace(u_pi_d=1, d_d=43690), v_dead_adaline.Registers(**regs))
     assert state.v_dead > 0
 
 
@@ -73,10 +77,11 @@ def test_one_lsb_of_psi():
     eta = values.eta_psi * 2.0**-19
     for k in range(len(v_leg)):
         u_q, d_q, i_d, i_q, omega = (int(seen[n][k]) for n in ("u_q", "d_q", "i_d", "i_q", "omega_chord"))
-        state, (psi, held) = psi_adaline.step(
-            state, u_q, d_q, int(v_leg[k]), i_d, i_q, r, omega, 0, 0, 0, 1, 1,
-            values.l_d, values.eta_psi, values.omega_psi_min,
+        inputs = psi_adaline.Inputs(
+            u_q=u_q, d_q=d_q, v_leg=int(v_leg[k]), i_d=i_d, i_q=i_q, r=r, omega_chord=omega, sat_d=0, sat_q=0,
+            current_at_rail=0, voltage_known=1, run=1,
         )  # fmt: skip
+        state, (psi, held) = psi_adaline.step(state, inputs, values)
         if not held:
             w = omega * 2.0**-16
             known = v_leg[k] * 2.0**-18 * d_q * 2.0**-16 + r * 2.0**-24 * i_q * 2.0**-16

@@ -97,19 +97,27 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
     w, p, c = state.wires, pins, AT_CONVERTERS
     encoder, currents, adc_bits, position_bits, lines = config
     position, seen_position = position_step(
-        state.of_position, p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], w.trigger, w.codes_done, b.clear_encoder,
-        b.omega_given, b.reverse, b.filter_clocks, b.index_phase, b.counts, b.code_step, b.code_rest, b.correct_max,
-        b.k_edge, b.hall_reverse, b.hall_offset, b.start_first, b.sector_counts, b.half_period, b.encoder_bits,
-        b.turn_bits, b.gray, b.parity_on, b.crc_on, b.start_max, b.mode_command, b.two_errors, b.position_delay,
-        b.bridge_max, encoder, position_bits,
+        state.of_position,
+        position_front.Inputs(
+            pin_a=p[0], pin_b=p[1], pin_z=p[2], hall_a=p[3], hall_b=p[4], hall_c=p[5], serial_data=p[6],
+            position_in=p[7], sample_trigger=w.trigger, codes_valid=w.codes_done, clear_encoder=b.clear_encoder,
+            omega_set=b.omega_given, reverse=b.reverse,
+        ),
+        b,
+        encoder,
+        position_bits,
     )  # fmt: skip
     converters, seen_converters = converter_step(
-        state.of_converters, p[c], p[c + 1], p[c + 2], p[c + 3], p[c + 4], p[c + 5], p[c + 6], p[c + 7], p[c + 8],
-        p[c + 9], p[c + 10], p[c + 11], w.trigger, b.clear_encoder, b.clock_ratio, b.spi_bits, b.spi_skip, b.spi_delay,
-        b.wait_clocks, b.busy_timeout, b.two_words, b.use_convst, b.clock_idle, b.second_edge, b.signed_code,
-        b.channel_a, b.channel_b, b.channel_c, b.channel_u_dc, b.conversions, b.xadc_channels, b.address_0, b.address_1,
-        b.address_2, b.address_3, b.xadc_timeout, b.mod_ratio, b.mod_delay, b.follow_clock, b.oversampling, b.sinc_gain,
-        b.start_clocks, b.trip_oversampling, b.limit_high, b.limit_low, currents, adc_bits, lines,
+        state.of_converters,
+        current_front.Inputs(
+            miso=p[c], busy=p[c + 1], eoc=p[c + 2], drdy=p[c + 3], drp_do=p[c + 4], mod_data=p[c + 5],
+            mod_clock_in=p[c + 6], code_a_in=p[c + 7], code_b_in=p[c + 8], code_c_in=p[c + 9],
+            code_u_dc_in=p[c + 10], codes_valid_in=p[c + 11], sample_trigger=w.trigger, clear_encoder=b.clear_encoder,
+        ),
+        b,
+        currents,
+        adc_bits,
+        lines,
     )  # fmt: skip
     forcing, (position_code, position_restart, speed_now, forced) = forced_step(
         state.of_forcing, w.encoder_code, w.encoder_restart, b.speed_given, w.trigger, b.position_source,
@@ -124,28 +132,63 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
         state.of_snapshot, w.sample_valid, b.take_snapshot, w.encoder_code, w.position_code, w.encoder_count,
         w.encoder_flags, w.adc_a, w.adc_b, w.adc_c, w.adc_u_dc, adc_bits, position_bits,
     )  # fmt: skip
+    i = inputs
     now = clocked.Inputs(
-        w.sample_valid, inputs.enable, 1 if w.board_stop or state.trip_2 else 0, inputs.clear_trip,
-        inputs.host_write, inputs.sample_faults, inputs.sample_trip, inputs.current_offset, inputs.motion_faults,
-        inputs.open_load, inputs.brake_asked, inputs.compare_a, inputs.compare_b, inputs.compare_c,
+        sample_valid=w.sample_valid, enable=i.enable, trip=1 if w.board_stop or state.trip_2 else 0,
+        clear_trip=i.clear_trip, host_write=i.host_write, sample_faults=i.sample_faults, sample_trip=i.sample_trip,
+        current_offset=i.current_offset, motion_faults=i.motion_faults, open_load=i.open_load,
+        brake_asked=i.brake_asked, compare_a=i.compare_a, compare_b=i.compare_b, compare_c=i.compare_c,
     )  # fmt: skip
     core, entered, seen_core = clocked.step(state.of_core, now, regs, carrier_half)
     causes, (_, irq) = interrupts_step(
         state.of_interrupts, w.tripped, w.fault_flags, w.setting_refused, w.running, b.irq_mask, b.irq_clear
     )
-    encoder_code, restart, omega_now, position_done, count, flags, _, _, _, _, wrong, lost, _, _, _ = seen_position
-    adc_a, adc_b, adc_c, adc_u_dc, codes_done, _, _, over, _, _, _, _, _, _ = seen_converters
+    x, y, z = seen_position, seen_converters, seen_core
     wires = Wires(
-        seen_core.sample_trigger, seen_core.gate_high, seen_core.gate_low, sample_valid, codes_done, adc_a, adc_b,
-        adc_c, adc_u_dc, encoder_code, restart, omega_now, position_done, count, flags, wrong, lost, over,
-        position_code, position_restart, speed_now, board_stop, seen_core.running, seen_core.tripped,
-        seen_core.fault_flags, seen_core.setting_refused, irq,
-    )  # fmt: skip
+        trigger=z.sample_trigger,
+        gate_high=z.gate_high,
+        gate_low=z.gate_low,
+        sample_valid=sample_valid,
+        codes_done=y.codes_done,
+        adc_a=y.adc_a,
+        adc_b=y.adc_b,
+        adc_c=y.adc_c,
+        adc_u_dc=y.adc_u_dc,
+        encoder_code=x.encoder_code,
+        encoder_restart=x.encoder_restart,
+        omega_now=x.omega_now,
+        position_done=x.position_done,
+        encoder_count=x.encoder_count,
+        encoder_flags=x.encoder_flags,
+        index_wrong=x.index_wrong,
+        position_lost=x.position_lost,
+        converter_over=y.converter_over,
+        position_code=position_code,
+        position_restart=position_restart,
+        speed_now=speed_now,
+        board_stop=board_stop,
+        running=z.running,
+        tripped=z.tripped,
+        fault_flags=z.fault_flags,
+        setting_refused=z.setting_refused,
+        irq=irq,
+    )
     # The power stage: a trip is caught without a clock, and let go when the core has it
     caught = 1 if p[AT_TRIP] or state.caught else 0
     kept = 1 if p[AT_TRIP] or (caught and not state.trip_2) else 0
     following = State(
-        core, position, converters, forcing, join, faults, snapshot, causes, kept, caught, state.trip_1, wires
+        of_core=core,
+        of_position=position,
+        of_converters=converters,
+        of_forcing=forcing,
+        of_join=join,
+        of_faults=faults,
+        of_snapshot=snapshot,
+        of_interrupts=causes,
+        caught=kept,
+        trip_1=caught,
+        trip_2=state.trip_1,
+        wires=wires,
     )
     board = (forced, board_flags, board_first)
     return following, entered, seen_core, seen_position, seen_converters, board, seen_snapshot, caught
@@ -169,14 +212,13 @@ def run_clocks(state, inputs, regs, b, pins, carrier_half, config, until_idle, s
         x = seen[k]
         x[0], x[1] = 0 if off else before.gate_high, 0 if off else before.gate_low
         x[2], x[3] = before.trigger, state.wires.irq
-        x[4], x[5], x[6] = position[12], position[13], position[14]
-        x[7], x[8], x[9], x[10], x[11], x[12] = (
-            converters[8], converters[9], converters[10], converters[11], converters[12], converters[13]
-        )  # fmt: skip
+        x[4], x[5], x[6] = position.serial_clock, position.serial_out, position.serial_drive
+        x[7], x[8], x[9] = converters.convst, converters.cs_n, converters.sclk
+        x[10], x[11], x[12] = converters.den, converters.daddr, converters.mod_clock
         y = status[k]
-        y[0], y[1], y[2] = position[5], position[4], position[6]
-        y[3], y[4], y[5] = position[7], position[8], position[9]
-        y[6], y[7] = converters[5], converters[6]
+        y[0], y[1], y[2] = position.encoder_flags, position.encoder_count, position.index_count
+        y[3], y[4], y[5] = position.illegal_count, position.lost_counts, position.bridged_count
+        y[6], y[7] = converters.converter_errors, converters.converter_refused
         y[8], y[9], y[10] = board
         y[11], y[12], y[13], y[14], y[15], y[16], y[17], y[18], y[19] = snapshot
         if entered:

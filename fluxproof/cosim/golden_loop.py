@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from fluxproof.cosim.closed_loop import Result, Scenario, described_sensors, load_torque
@@ -32,13 +34,35 @@ def mixed_kernel(function):
     return kernel(function, BOTH)
 
 
+class Stimulus(NamedTuple):
+    """What n periods are given."""
+
+    samples: np.ndarray  # (n, 8) int64: the fields of fluxproof.Sample after the codes
+    u_dc: np.ndarray  # (n,) V
+    load: np.ndarray  # (n,) Nm; with an imposed speed rad/s
+    brake: np.ndarray  # (n,) Nm, against the rotation
+
+
+class Bench(NamedTuple):
+    """The core's settings and the switching plant around it; the arrays change in place."""
+
+    registers: fluxproof.Registers
+    config: fluxproof.Config
+    plant_state: np.ndarray  # as plant/layout.py
+    plant_params: Any  # of plant_params()
+    sensors: Any  # of sensor_params()
+    dead_time_s: float  # s
+    period_s: float  # s, of a sample
+    levels: np.ndarray  # (3,) as half_gates
+    waits: np.ndarray  # (3,) s, as half_gates
+    free: bool  # False: the speed is imposed
+
+
 @kernel
 def run_controller(state, samples, registers, config, observed):
     """``samples`` (n, 13) in, ``observed`` (n, len(Observed)) out, both int64; returns the last state."""
     for k in range(samples.shape[0]):
-        x = samples[k]
-        sample = fluxproof.Sample(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12])
-        state, out = fluxproof.step(state, sample, registers, config)
+        state, out = fluxproof.step(state, fluxproof.sample_of(samples[k]), registers, config)
         for n, value in enumerate(out):
             observed[k, n] = value
     return state
@@ -59,19 +83,19 @@ def run_averaged(state, references, u_dc, load, registers, config, plant_state, 
         out[k, 2], out[k, 3] = plant_state[L.LAMBDA_D], plant_state[L.LAMBDA_Q]
         out[k, 4], out[k, 5] = plant_state[L.OMEGA_M], plant_state[L.TORQUE]
         sample = fluxproof.Sample(
-            current_code(sensors, 0, plant_state[L.I_A], k),
-            current_code(sensors, 1, plant_state[L.I_B], k),
-            current_code(sensors, 2, plant_state[L.I_C], k),
-            u_dc_code(sensors, u_dc[k], k),
-            position_code(sensors, plant_state[L.THETA_M], k),
-            references[k, 0],
-            references[k, 1],
-            references[k, 2],
-            references[k, 3],
-            0,
-            0,
-            0,
-            1,
+            adc_a=current_code(sensors, 0, plant_state[L.I_A], k),
+            adc_b=current_code(sensors, 1, plant_state[L.I_B], k),
+            adc_c=current_code(sensors, 2, plant_state[L.I_C], k),
+            adc_u_dc=u_dc_code(sensors, u_dc[k], k),
+            position_code=position_code(sensors, plant_state[L.THETA_M], k),
+            omega_ref=references[k, 0],
+            i_d_ref=references[k, 1],
+            i_q_ext=references[k, 2],
+            speed_mode=references[k, 3],
+            temp_winding=0,
+            temp_valid=0,
+            clear_faults=0,
+            run=1,
         )
         state, seen = fluxproof.step(state, sample, registers, config)
         half = (1 - 2 * (k & 1)) * registers.double_update
@@ -88,52 +112,52 @@ PLANT = ("i_d", "i_q", "lambda_d", "lambda_q", "omega_m", "torque")
 
 
 @mixed_kernel
-def run_switching(
-    state, samples, u_dc, load, brake, registers, config, plant_state, plant_params, sensors, dead_time_s, period_s,
-    first, free, out, observed, levels, waits,
-):  # fmt: skip
+def run_switching(state, stimulus, bench, first, out, observed):
     """Closed loop over the switching plant; returns the controller's state.
 
-    ``samples`` (n, 8) int64: the fields of fluxproof.Sample after the codes; ``u_dc`` [V], ``load``,
-    ``brake`` [Nm] (n,), with an imposed speed ``load`` [rad/s].  ``first``: number of the first period, for the
-    sensors' noise, and with double_update for the half: even ones rise; ``levels``, ``waits`` are those of half_gates.
+    ``stimulus``: Stimulus of n periods; ``bench``: Bench.  ``first``: number of the first period, for the sensors'
+    noise, and with double_update for the half: even ones rise.
     ``out`` (n, 6) receives the signals of PLANT before each period, ``observed`` the core's.
     """
+    b, plant_state, sensors = bench, bench.plant_state, bench.sensors
     duties = np.zeros(3)
-    for k in range(load.shape[0]):
+    for k in range(stimulus.load.shape[0]):
         out[k, 0], out[k, 1] = plant_state[L.I_D], plant_state[L.I_Q]
         out[k, 2], out[k, 3] = plant_state[L.LAMBDA_D], plant_state[L.LAMBDA_Q]
         out[k, 4], out[k, 5] = plant_state[L.OMEGA_M], plant_state[L.TORQUE]
+        given, u_dc = stimulus.samples[k], stimulus.u_dc[k]
         sample = fluxproof.Sample(
-            current_code(sensors, 0, plant_state[L.I_A], first + k),
-            current_code(sensors, 1, plant_state[L.I_B], first + k),
-            current_code(sensors, 2, plant_state[L.I_C], first + k),
-            u_dc_code(sensors, u_dc[k], first + k),
-            position_code(sensors, plant_state[L.THETA_M], first + k),
-            samples[k, 0],
-            samples[k, 1],
-            samples[k, 2],
-            samples[k, 3],
-            samples[k, 4],
-            samples[k, 5],
-            samples[k, 6],
-            samples[k, 7],
+            adc_a=current_code(sensors, 0, plant_state[L.I_A], first + k),
+            adc_b=current_code(sensors, 1, plant_state[L.I_B], first + k),
+            adc_c=current_code(sensors, 2, plant_state[L.I_C], first + k),
+            adc_u_dc=u_dc_code(sensors, u_dc, first + k),
+            position_code=position_code(sensors, plant_state[L.THETA_M], first + k),
+            omega_ref=given[0],
+            i_d_ref=given[1],
+            i_q_ext=given[2],
+            speed_mode=given[3],
+            temp_winding=given[4],
+            temp_valid=given[5],
+            clear_faults=given[6],
+            run=given[7],
         )
-        duties[0] = state.compare_a / config.carrier_half
-        duties[1] = state.compare_b / config.carrier_half
-        duties[2] = state.compare_c / config.carrier_half
-        state, seen = fluxproof.step(state, sample, registers, config)
+        duties[0] = state.compare_a / b.config.carrier_half
+        duties[1] = state.compare_b / b.config.carrier_half
+        duties[2] = state.compare_c / b.config.carrier_half
+        state, seen = fluxproof.step(state, sample, b.registers, b.config)
         for n, value in enumerate(seen):
             observed[k, n] = value
-        if registers.double_update:
+        if b.registers.double_update:
             half = 1 - 2 * ((first + k) & 1)
-            times, words = half_gates(duties, half, levels, waits, dead_time_s, period_s)
+            times, words = half_gates(duties, half, b.levels, b.waits, b.dead_time_s, b.period_s)
         else:
-            times, words = centred_gates(duties, dead_time_s, period_s)
-        if not samples[k, 7]:
-            words[:], levels[:], waits[:] = 0, 0.0, dead_time_s
-        pull = load_torque(load[k], brake[k], plant_state[L.OMEGA_M]) if free else load[k]
-        advance_switching(plant_state, plant_params, times, words, u_dc[k], pull, period_s, -1.0)
+            times, words = centred_gates(duties, b.dead_time_s, b.period_s)
+        if not sample.run:
+            words[:], b.levels[:], b.waits[:] = 0, 0.0, b.dead_time_s
+        pull = stimulus.load[k]
+        if b.free:
+            pull = load_torque(pull, stimulus.brake[k], plant_state[L.OMEGA_M])
+        advance_switching(plant_state, b.plant_params, times, words, u_dc, pull, b.period_s, -1.0)
     return state
 
 
@@ -150,8 +174,6 @@ def simulate(
     """
     machine = machine or Machine.from_mapping(vars(drive.machine))
     params = plant_params(machine, inverter or Inverter(), mode=mode)
-    plant_state = initial_state(machine, params, omega_m=scenario.omega_m)
-    codes = sensor_params(sensors or described_sensors(drive))
     n = len(scenario)
     inputs = np.zeros((n, 8), np.int64)
     columns = (
@@ -167,17 +189,26 @@ def simulate(
     brake = np.zeros(n) if scenario.brake is None else scenario.brake
     out, observed = np.zeros((n, len(PLANT))), np.zeros((n, len(fluxproof.Observed._fields)), np.int64)
     state, values = state or fluxproof.State(), register_set.values
-    levels, waits = np.zeros(3), np.full(3, float(dead_time_s))
+    bench = Bench(
+        registers=values,
+        config=register_set.config,
+        plant_state=initial_state(machine, params, omega_m=scenario.omega_m),
+        plant_params=params,
+        sensors=sensor_params(sensors or described_sensors(drive)),
+        dead_time_s=float(dead_time_s),
+        period_s=drive.sample_time_s,
+        levels=np.zeros(3),
+        waits=np.full(3, float(dead_time_s)),
+        free=mode == FREE,
+    )
     shown = set() if progress is None else set(range(0, n, PROGRESS_PERIODS))
     ends = [*sorted((set(scenario.changes) | shown) - {0}), n]
     for start, end in zip([0, *ends[:-1]], ends, strict=True):
         values = values._replace(**scenario.changes.get(start, {}))
         part = slice(start, end)
-        state = run_switching(
-            state, inputs[part], scenario.u_dc[part], scenario.load[part], brake[part], values, register_set.config,
-            plant_state, params, codes, float(dead_time_s), drive.sample_time_s, start, mode == FREE,
-            out[part], observed[part], levels, waits,
-        )  # fmt: skip
+        stimulus = Stimulus(inputs[part], scenario.u_dc[part], scenario.load[part], brake[part])
+        bench = bench._replace(registers=values)
+        state = run_switching(state, stimulus, bench, start, out[part], observed[part])
         if progress is not None:
             progress(end, n)
     names = fluxproof.Observed._fields

@@ -9,6 +9,7 @@ is an error: it is counted, the sample stays away and the core's watchdog acts.
 Formats: codes.  The codes change a clock after those of the converter, with ``codes_done``.  The counter saturates.
 """
 
+from collections import namedtuple
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
@@ -43,14 +44,8 @@ class State(NamedTuple):
 
 
 @kernel
-def step(
-    state, miso, busy, eoc, drdy, drp_do, mod_data, mod_clock_in, code_a_in, code_b_in, code_c_in, code_u_dc_in,
-    codes_valid_in, sample_trigger, clear_encoder, clock_ratio, spi_bits, spi_skip, spi_delay, wait_clocks,
-    busy_timeout, two_words, use_convst, clock_idle, second_edge, signed_code, channel_a, channel_b, channel_c,
-    channel_u_dc, conversions, xadc_channels, address_0, address_1, address_2, address_3, xadc_timeout, mod_ratio,
-    mod_delay, follow_clock, oversampling, sinc_gain, start_clocks, trip_oversampling, limit_high, limit_low, currents,
-    adc_bits, spi_lines,
-):  # fmt: skip
+def step(state, inputs, regs, currents, adc_bits, spi_lines):
+    x, r = inputs, regs
     s = state
     spi, xadc, sigma = s.of_spi, s.of_xadc, s.of_sigma
     c0, c1, c2, c3, c4, c5, c6, c7 = 0, 0, 0, 0, 0, 0, 0, 0
@@ -58,46 +53,79 @@ def step(
     new, wrong = s.codes_valid, s.error
     if currents == SPI:
         spi, (convst, cs_n, sclk, valid, error, refused, c0, c1, c2, c3, c4, c5, c6, c7) = spi_step(
-            s.of_spi, sample_trigger, miso, busy, clock_ratio, spi_bits, spi_skip, spi_delay, wait_clocks, busy_timeout,
-            two_words, use_convst, clock_idle, second_edge, signed_code, adc_bits, spi_lines,
+            s.of_spi,
+            spi_converter.Inputs(sample_trigger=x.sample_trigger, miso=x.miso, busy=x.busy),
+            spi_converter.Registers(
+                clock_ratio=r.clock_ratio, word_bits=r.spi_bits, skip_bits=r.spi_skip, sample_delay=r.spi_delay,
+                wait_clocks=r.wait_clocks, busy_timeout=r.busy_timeout, two_words=r.two_words,
+                use_convst=r.use_convst, clock_idle=r.clock_idle, second_edge=r.second_edge,
+                signed_code=r.signed_code,
+            ),
+            adc_bits,
+            spi_lines,
         )  # fmt: skip
     elif currents == XADC:
         xadc, (convst, den, daddr, valid, error, c0, c1, c2, c3) = xadc_step(
-            s.of_xadc, sample_trigger, busy, eoc, drdy, drp_do, conversions, xadc_channels, address_0, address_1,
-            address_2, address_3, xadc_timeout, signed_code, adc_bits,
+            s.of_xadc,
+            xadc_reader.Inputs(
+                sample_trigger=x.sample_trigger, busy=x.busy, eoc=x.eoc, drdy=x.drdy, drp_do=x.drp_do
+            ),
+            xadc_reader.Registers(
+                conversions=r.conversions, channels=r.xadc_channels, address_0=r.address_0, address_1=r.address_1,
+                address_2=r.address_2, address_3=r.address_3, timeout=r.xadc_timeout, signed_code=r.signed_code,
+            ),
+            adc_bits,
         )  # fmt: skip
     elif currents == DELTA_SIGMA:
         sigma, (mod_clock, c0, c1, c2, c3, valid, error, over) = sigma_step(
-            s.of_sigma, mod_data, mod_clock_in, sample_trigger, mod_ratio, mod_delay, follow_clock, oversampling,
-            sinc_gain, start_clocks, trip_oversampling, limit_high, limit_low, adc_bits,
-        )  # fmt: skip
+            s.of_sigma,
+            delta_sigma.Inputs(mod_data=x.mod_data, mod_clock_in=x.mod_clock_in, sample_trigger=x.sample_trigger),
+            r,
+            adc_bits,
+        )
 
     if currents == SPI:
-        a, b, c, u_dc = s.codes[channel_a], s.codes[channel_b], s.codes[channel_c], s.codes[channel_u_dc]
+        a, b, c, u_dc = s.codes[r.channel_a], s.codes[r.channel_b], s.codes[r.channel_c], s.codes[r.channel_u_dc]
     elif currents == XADC:
         a, b, c, u_dc = (
-            s.codes[channel_a & 3], s.codes[channel_b & 3], s.codes[channel_c & 3], s.codes[channel_u_dc & 3]
+            s.codes[r.channel_a & 3], s.codes[r.channel_b & 3], s.codes[r.channel_c & 3], s.codes[r.channel_u_dc & 3]
         )  # fmt: skip
     elif currents == DELTA_SIGMA:
         a, b, c, u_dc = s.codes[0], s.codes[1], s.codes[2], s.codes[3]
     else:
-        a, b, c, u_dc, new = code_a_in, code_b_in, code_c_in, code_u_dc_in, codes_valid_in
-    errors = 0 if clear_encoder else s.errors
+        a, b, c, u_dc, new = x.code_a_in, x.code_b_in, x.code_c_in, x.code_u_dc_in, x.codes_valid_in
+    errors = 0 if x.clear_encoder else s.errors
     following = State(
-        spi, xadc, sigma,
-        a if new else s.adc_a,
-        b if new else s.adc_b,
-        c if new else s.adc_c,
-        u_dc if new else s.adc_u_dc,
-        new,
-        min(errors + (1 if wrong else 0), EVENTS_MAX),
-        (c0, c1, c2, c3, c4, c5, c6, c7), valid, error,
-    )  # fmt: skip
+        of_spi=spi,
+        of_xadc=xadc,
+        of_sigma=sigma,
+        adc_a=a if new else s.adc_a,
+        adc_b=b if new else s.adc_b,
+        adc_c=c if new else s.adc_c,
+        adc_u_dc=u_dc if new else s.adc_u_dc,
+        done=new,
+        errors=min(errors + (1 if wrong else 0), EVENTS_MAX),
+        codes=(c0, c1, c2, c3, c4, c5, c6, c7),
+        codes_valid=valid,
+        error=error,
+    )
     f = following
-    return following, (
-        f.adc_a, f.adc_b, f.adc_c, f.adc_u_dc, f.done, f.errors, refused, over, convst, cs_n, sclk, den, daddr,
-        mod_clock,
-    )  # fmt: skip
+    return following, Outputs(
+        adc_a=f.adc_a,
+        adc_b=f.adc_b,
+        adc_c=f.adc_c,
+        adc_u_dc=f.adc_u_dc,
+        codes_done=f.done,
+        converter_errors=f.errors,
+        converter_refused=refused,
+        converter_over=over,
+        convst=convst,
+        cs_n=cs_n,
+        sclk=sclk,
+        den=den,
+        daddr=daddr,
+        mod_clock=mod_clock,
+    )
 
 
 SOURCES = {SPI: spi_converter, XADC: xadc_reader, DELTA_SIGMA: delta_sigma}
@@ -153,37 +181,45 @@ _SIGMA = {p.name: p for p in delta_sigma.BLOCK.inputs}
 CHANNEL = Format(0, 3, 0)
 CODES = ("a", "b", "c", "u_dc")
 
+INPUTS = (
+    _SPI["miso"],
+    Port("busy", BIT, doc="1: the converter converts, not synchronous"),
+    *(_XADC[n] for n in ("eoc", "drdy", "drp_do")),
+    *(_SIGMA[n] for n in ("mod_data", "mod_clock_in")),
+    *(Port(f"code_{x}_in", CODE, doc=f"code from elsewhere, {x}") for x in CODES),
+    Port("codes_valid_in", BIT, doc="1: the codes from elsewhere are there"),
+    Port("sample_trigger", BIT, doc="1: take a sample"),
+    Port("clear_encoder", BIT, doc="1: clear the counter of errors"),
+)
+Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
+REGISTERS = (
+    *(renamed(p, ON_A_BOARD.get(p.name, p.name)) for p in spi_converter.BLOCK.registers),
+    *(Port(f"channel_{x}", CHANNEL, doc=f"code of the converter that is {x}") for x in CODES),
+    *(renamed(p, ON_A_BOARD.get(p.name, p.name)) for p in xadc_reader.BLOCK.registers[:-1]),
+    *delta_sigma.REGISTERS,
+)
+Registers = namedtuple("Registers", [p.name for p in REGISTERS])
+OUTPUTS = (
+    *(Port(f"adc_{x}", CODE, doc=f"ADC code, {x}") for x in CODES),
+    Port("codes_done", BIT, doc="1: the four codes are new"),
+    Port("converter_errors", EVENTS, doc="triggers without codes, saturates"),
+    Port("converter_refused", BIT, doc="1: the registers of the SPI converters contradict each other"),
+    Port("converter_over", BIT, doc="1: fast overcurrent of a modulator"),
+    *(_SPI[n] for n in ("convst", "cs_n", "sclk")),
+    *(_XADC[n] for n in ("den", "daddr")),
+    Port("mod_clock", BIT, doc="clock for the modulators"),
+)
+Outputs = namedtuple("Outputs", [p.name for p in OUTPUTS])
+
 BLOCK = Block(
     name="current_front",
     folder="converters",
     paper="none: front end of a board",
     step=step,
-    inputs=(
-        _SPI["miso"],
-        Port("busy", BIT, doc="1: the converter converts, not synchronous"),
-        *(_XADC[n] for n in ("eoc", "drdy", "drp_do")),
-        *(_SIGMA[n] for n in ("mod_data", "mod_clock_in")),
-        *(Port(f"code_{x}_in", CODE, doc=f"code from elsewhere, {x}") for x in CODES),
-        Port("codes_valid_in", BIT, doc="1: the codes from elsewhere are there"),
-        Port("sample_trigger", BIT, doc="1: take a sample"),
-        Port("clear_encoder", BIT, doc="1: clear the counter of errors"),
-    ),
-    registers=(
-        *(renamed(p, ON_A_BOARD.get(p.name, p.name)) for p in spi_converter.BLOCK.registers),
-        *(Port(f"channel_{x}", CHANNEL, doc=f"code of the converter that is {x}") for x in CODES),
-        *(renamed(p, ON_A_BOARD.get(p.name, p.name)) for p in xadc_reader.BLOCK.registers[:-1]),
-        *delta_sigma.REGISTERS,
-    ),
-    outputs=(
-        *(Port(f"adc_{x}", CODE, doc=f"ADC code, {x}") for x in CODES),
-        Port("codes_done", BIT, doc="1: the four codes are new"),
-        Port("converter_errors", EVENTS, doc="triggers without codes, saturates"),
-        Port("converter_refused", BIT, doc="1: the registers of the SPI converters contradict each other"),
-        Port("converter_over", BIT, doc="1: fast overcurrent of a modulator"),
-        *(_SPI[n] for n in ("convst", "cs_n", "sclk")),
-        *(_XADC[n] for n in ("den", "daddr")),
-        Port("mod_clock", BIT, doc="clock for the modulators"),
-    ),
+    takes=(Inputs, Registers),
+    inputs=INPUTS,
+    registers=REGISTERS,
+    outputs=OUTPUTS,
     state=State(),
     latency=1,
     clocked=True,

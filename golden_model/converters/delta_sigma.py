@@ -5,6 +5,7 @@ Nothing is computed here.  Modulators 0 to 3 are a, b, c and the bus.  All filte
 come together; one ``code_valid`` and one ``window_error`` stand for all.
 """
 
+from collections import namedtuple
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
@@ -32,32 +33,30 @@ class State(NamedTuple):
 
 
 @kernel
-def step(
-    state, mod_data, mod_clock_in, sample_trigger, mod_ratio, mod_delay, follow_clock, oversampling, sinc_gain,
-    start_clocks, trip_oversampling, limit_high, limit_low, adc_bits,
-):  # fmt: skip
+def step(state, inputs, regs, adc_bits):
+    x, r = inputs, regs
     s = state
-    inputs, (mod_clock, bits, bits_valid) = input_step(
-        s.of_input, mod_data, mod_clock_in, mod_ratio, mod_delay, follow_clock, LINES
+    taken, (mod_clock, bits, bits_valid) = input_step(
+        s.of_input, x.mod_data, x.mod_clock_in, r.mod_ratio, r.mod_delay, r.follow_clock, LINES
     )
     bit_a, bit_b, bit_c, bit_u_dc = s.bits & 1, s.bits >> 1 & 1, s.bits >> 2 & 1, s.bits >> 3 & 1
     new = s.bits_valid
     sinc_a, (code_a, code_valid, window_error) = sinc_step(
-        s.of_sinc_a, sample_trigger, bit_a, new, oversampling, sinc_gain, start_clocks, adc_bits
+        s.of_sinc_a, x.sample_trigger, bit_a, new, r.oversampling, r.sinc_gain, r.start_clocks, adc_bits
     )
     sinc_b, (code_b, _, _) = sinc_step(
-        s.of_sinc_b, sample_trigger, bit_b, new, oversampling, sinc_gain, start_clocks, adc_bits
+        s.of_sinc_b, x.sample_trigger, bit_b, new, r.oversampling, r.sinc_gain, r.start_clocks, adc_bits
     )
     sinc_c, (code_c, _, _) = sinc_step(
-        s.of_sinc_c, sample_trigger, bit_c, new, oversampling, sinc_gain, start_clocks, adc_bits
+        s.of_sinc_c, x.sample_trigger, bit_c, new, r.oversampling, r.sinc_gain, r.start_clocks, adc_bits
     )
     sinc_u_dc, (code_u_dc, _, _) = sinc_step(
-        s.of_sinc_u_dc, sample_trigger, bit_u_dc, new, oversampling, sinc_gain, start_clocks, adc_bits
+        s.of_sinc_u_dc, x.sample_trigger, bit_u_dc, new, r.oversampling, r.sinc_gain, r.start_clocks, adc_bits
     )
-    over_a, (is_over_a, _, _) = over_step(s.of_over_a, bit_a, new, trip_oversampling, limit_high, limit_low)
-    over_b, (is_over_b, _, _) = over_step(s.of_over_b, bit_b, new, trip_oversampling, limit_high, limit_low)
-    over_c, (is_over_c, _, _) = over_step(s.of_over_c, bit_c, new, trip_oversampling, limit_high, limit_low)
-    following = State(inputs, sinc_a, sinc_b, sinc_c, sinc_u_dc, over_a, over_b, over_c, bits, bits_valid)
+    over_a, (is_over_a, _, _) = over_step(s.of_over_a, bit_a, new, r.trip_oversampling, r.limit_high, r.limit_low)
+    over_b, (is_over_b, _, _) = over_step(s.of_over_b, bit_b, new, r.trip_oversampling, r.limit_high, r.limit_low)
+    over_c, (is_over_c, _, _) = over_step(s.of_over_c, bit_c, new, r.trip_oversampling, r.limit_high, r.limit_low)
+    following = State(taken, sinc_a, sinc_b, sinc_c, sinc_u_dc, over_a, over_b, over_c, bits, bits_valid)
     over = 1 if is_over_a or is_over_b or is_over_c else 0
     return following, (mod_clock, code_a, code_b, code_c, code_u_dc, code_valid, window_error, over)
 
@@ -111,16 +110,21 @@ REGISTERS = (
     _OVER["limit_low"],
 )
 
+INPUTS = (
+    Port("mod_data", Format(0, LINES, 0), doc="data of the modulators a, b, c, bus, not synchronous"),
+    _PORTS["mod_clock_in"],
+    _PORTS["sample_trigger"],
+)
+Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
+Registers = namedtuple("Registers", [p.name for p in REGISTERS])
+
 BLOCK = Block(
     name="delta_sigma",
     folder="converters",
     paper="none: front end of a board",
     step=step,
-    inputs=(
-        Port("mod_data", Format(0, LINES, 0), doc="data of the modulators a, b, c, bus, not synchronous"),
-        _PORTS["mod_clock_in"],
-        _PORTS["sample_trigger"],
-    ),
+    takes=(Inputs, Registers),
+    inputs=INPUTS,
     registers=REGISTERS,
     outputs=(
         _PORTS["mod_clock"],

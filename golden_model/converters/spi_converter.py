@@ -8,6 +8,7 @@ registered twice; ``sample_delay`` covers the round trip (output pad, isolator, 
 line is stable then.
 """
 
+from collections import namedtuple
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
@@ -25,17 +26,26 @@ class State(NamedTuple):
 
 
 @kernel
-def step(
-    state, sample_trigger, miso, busy, clock_ratio, word_bits, skip_bits, sample_delay, wait_clocks, busy_timeout,
-    two_words, use_convst, clock_idle, second_edge, signed_code, adc_bits, lines,
-):  # fmt: skip
+def step(state, inputs, regs, adc_bits, lines):
+    x, r = inputs, regs
     s = state
     frame, (convst, cs_n, sclk, frame_start, bit_taken, frame_error, setting_refused) = spi_frame.step(
-        s.of_spi_frame, sample_trigger, busy, s.codes_valid, clock_ratio, word_bits, skip_bits, sample_delay,
-        wait_clocks, busy_timeout, two_words, use_convst, clock_idle, second_edge, adc_bits,
-    )  # fmt: skip
+        s.of_spi_frame,
+        spi_frame.Inputs(sample_trigger=x.sample_trigger, busy=x.busy, words_complete=s.codes_valid),
+        r,
+        adc_bits,
+    )
     words, (codes_valid, code_0, code_1, code_2, code_3, code_4, code_5, code_6, code_7) = spi_words.step(
-        s.of_spi_words, s.frame_start, s.bit_taken, miso, word_bits, skip_bits, two_words, signed_code, adc_bits, lines
+        s.of_spi_words,
+        s.frame_start,
+        s.bit_taken,
+        x.miso,
+        r.word_bits,
+        r.skip_bits,
+        r.two_words,
+        r.signed_code,
+        adc_bits,
+        lines,
     )
     following = State(frame, words, frame_start, bit_taken, codes_valid)
     outputs = (
@@ -65,13 +75,19 @@ def _on_lines(rows, rng, config):
     return rows
 
 
+INPUTS = (spi_frame.BLOCK.inputs[0], spi_words.MISO, spi_frame.BLOCK.inputs[1])
+Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
+REGISTERS = spi_frame.BLOCK.registers + spi_words.REGISTERS[-1:]
+Registers = namedtuple("Registers", [p.name for p in REGISTERS])
+
 BLOCK = Block(
     name="spi_converter",
     folder="converters",
     paper="none: front end of a board",
     step=step,
-    inputs=(spi_frame.BLOCK.inputs[0], spi_words.MISO, spi_frame.BLOCK.inputs[1]),
-    registers=spi_frame.BLOCK.registers + spi_words.REGISTERS[-1:],
+    takes=(Inputs, Registers),
+    inputs=INPUTS,
+    registers=REGISTERS,
     outputs=(
         *spi_frame.BLOCK.outputs[:3],
         Port("codes_valid", BIT, doc="1 for a clock: the codes are new"),

@@ -20,6 +20,7 @@ goes on, and a frame whose bits do not all arrive, because a register changed me
 BUSY is not synchronous and passes two registers.  Formats: clocks.
 """
 
+from collections import namedtuple
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
@@ -51,20 +52,18 @@ class State(NamedTuple):
 
 
 @kernel
-def step(
-    state, sample_trigger, busy, words_complete, clock_ratio, word_bits, skip_bits, sample_delay, wait_clocks,
-    busy_timeout, two_words, use_convst, clock_idle, second_edge, adc_bits,
-):  # fmt: skip
+def step(state, inputs, regs, adc_bits):
+    x, r = inputs, regs
     s = state
-    good = LEAST_RATIO <= clock_ratio <= MOST_RATIO and LEAST_BITS <= word_bits <= MOST_BITS
-    good = good and skip_bits + adc_bits <= word_bits
-    half = clock_ratio >> 1
-    bits = word_bits << two_words
-    last_tick = s.tick + 1 >= clock_ratio
+    good = LEAST_RATIO <= r.clock_ratio <= MOST_RATIO and LEAST_BITS <= r.word_bits <= MOST_BITS
+    good = good and r.skip_bits + adc_bits <= r.word_bits
+    half = r.clock_ratio >> 1
+    bits = r.word_bits << r.two_words
+    last_tick = s.tick + 1 >= r.clock_ratio
     sampling = 1 if s.phase == READING and s.tick == half else 0
-    active = s.phase == READING and (s.tick < half if second_edge else s.tick >= half)
-    bit_taken = (s.strobes >> sample_delay) & 1
-    complete = 1 if s.complete or words_complete else 0
+    active = s.phase == READING and (s.tick < half if r.second_edge else s.tick >= half)
+    bit_taken = (s.strobes >> r.sample_delay) & 1
+    complete = 1 if s.complete or x.words_complete else 0
 
     # Conversion and frame
     phase, elapsed, tick, sent = s.phase, s.elapsed, s.tick + 1, s.sent
@@ -72,13 +71,13 @@ def step(
     frame_start, frame_error = 0, 0
     if s.phase == IDLE:
         elapsed, tick, sent, strobes, complete = 1, 0, 0, 0, 0
-        if sample_trigger and good:
-            phase, frame_start = CONVERTING if use_convst else LEADING, 1
+        if x.sample_trigger and good:
+            phase, frame_start = CONVERTING if r.use_convst else LEADING, 1
     elif s.phase == CONVERTING:
         elapsed, tick = s.elapsed + 1, 0
-        if s.elapsed >= wait_clocks and not s.busy_now:
+        if s.elapsed >= r.wait_clocks and not s.busy_now:
             phase = LEADING
-        elif s.elapsed >= busy_timeout:
+        elif s.elapsed >= r.busy_timeout:
             phase, frame_error = IDLE, 1
     elif s.phase == LEADING:
         if last_tick:
@@ -92,14 +91,14 @@ def step(
         phase = IDLE
     elif s.tick >= TRAIL:
         phase, frame_error = IDLE, 1
-    if sample_trigger and (s.phase != IDLE or not good):
+    if x.sample_trigger and (s.phase != IDLE or not good):
         frame_error = 1
 
-    following = State(phase, elapsed, tick, sent, strobes, complete, busy, s.busy_meta)
+    following = State(phase, elapsed, tick, sent, strobes, complete, x.busy, s.busy_meta)
     outputs = (
         1 if phase == CONVERTING else 0,
         1 if phase == IDLE or phase == CONVERTING else 0,
-        1 - clock_idle if active else clock_idle,
+        1 - r.clock_idle if active else r.clock_idle,
         frame_start,
         bit_taken,
         frame_error,
@@ -195,28 +194,34 @@ def long_times(bits):
     return rows
 
 
+INPUTS = (
+    Port("sample_trigger", BIT, doc="1 for a clock: take a sample"),
+    Port("busy", BIT, doc="1: the converter converts, not synchronous"),
+    Port("words_complete", BIT, doc="1 for a clock: all bits have arrived"),
+)
+Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
+REGISTERS = (
+    Port("clock_ratio", RATIO, doc="clocks of a period of sclk, 4 to 16"),
+    Port("word_bits", BITS, doc="bits of a word, 12 to 32"),
+    Port("skip_bits", SKIP, doc="bits of a word before the code"),
+    Port("sample_delay", DELAY, doc="clocks from the edge of sclk until the line is taken"),
+    Port("wait_clocks", CLOCKS, doc="least time of convst, clocks"),
+    Port("busy_timeout", CLOCKS, doc="longest time of convst, clocks"),
+    Port("two_words", BIT, doc="1: two words on each line"),
+    Port("use_convst", BIT, doc="1: started by convst, 0: by cs_n"),
+    Port("clock_idle", BIT, doc="level of sclk between frames"),
+    Port("second_edge", BIT, doc="1: the second edge of sclk in a bit takes the line, 0: the first"),
+)
+Registers = namedtuple("Registers", [p.name for p in REGISTERS])
+
 BLOCK = Block(
     name="spi_frame",
     folder="converters",
     paper="none: front end of a board",
     step=step,
-    inputs=(
-        Port("sample_trigger", BIT, doc="1 for a clock: take a sample"),
-        Port("busy", BIT, doc="1: the converter converts, not synchronous"),
-        Port("words_complete", BIT, doc="1 for a clock: all bits have arrived"),
-    ),
-    registers=(
-        Port("clock_ratio", RATIO, doc="clocks of a period of sclk, 4 to 16"),
-        Port("word_bits", BITS, doc="bits of a word, 12 to 32"),
-        Port("skip_bits", SKIP, doc="bits of a word before the code"),
-        Port("sample_delay", DELAY, doc="clocks from the edge of sclk until the line is taken"),
-        Port("wait_clocks", CLOCKS, doc="least time of convst, clocks"),
-        Port("busy_timeout", CLOCKS, doc="longest time of convst, clocks"),
-        Port("two_words", BIT, doc="1: two words on each line"),
-        Port("use_convst", BIT, doc="1: started by convst, 0: by cs_n"),
-        Port("clock_idle", BIT, doc="level of sclk between frames"),
-        Port("second_edge", BIT, doc="1: the second edge of sclk in a bit takes the line, 0: the first"),
-    ),
+    takes=(Inputs, Registers),
+    inputs=INPUTS,
+    registers=REGISTERS,
     outputs=(
         Port("convst", BIT, doc="rising edge: start of the conversion"),
         Port("cs_n", BIT, doc="0: a frame"),

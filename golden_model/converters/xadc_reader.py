@@ -18,6 +18,7 @@ All codes change together, with ``codes_valid``.  Nothing is written: dwe and di
 Formats: clocks, codes; nothing is computed.
 """
 
+from collections import namedtuple
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
@@ -56,12 +57,10 @@ def offset_code(word, signed_code, adc_bits):
 
 
 @kernel
-def step(
-    state, sample_trigger, busy, eoc, drdy, drp_do, conversions, channels, address_0, address_1, address_2, address_3,
-    timeout, signed_code, adc_bits,
-):  # fmt: skip
+def step(state, inputs, regs, adc_bits):
+    x, r = inputs, regs
     s = state
-    late = s.elapsed >= timeout
+    late = s.elapsed >= r.timeout
     phase, elapsed, done = s.phase, s.elapsed + 1, s.done
     pulse = s.pulse - 1 if s.pulse > 0 else 0
     den, codes_valid, frame_error = 0, 0, 0
@@ -70,35 +69,35 @@ def step(
 
     if s.phase == IDLE:
         elapsed, done = 1, 0
-        if sample_trigger and not busy:
+        if x.sample_trigger and not x.busy:
             phase, pulse = CONVERTING, CONVST_CLOCKS
     elif s.phase == ENDING:
         phase, codes_valid = IDLE, 1
-        code_0 = offset_code(s.read_0, signed_code, adc_bits)
-        code_1 = offset_code(s.read_1, signed_code, adc_bits)
-        code_2 = offset_code(s.read_2, signed_code, adc_bits)
-        code_3 = offset_code(s.read_3, signed_code, adc_bits)
+        code_0 = offset_code(s.read_0, r.signed_code, adc_bits)
+        code_1 = offset_code(s.read_1, r.signed_code, adc_bits)
+        code_2 = offset_code(s.read_2, r.signed_code, adc_bits)
+        code_3 = offset_code(s.read_3, r.signed_code, adc_bits)
     elif late:
         phase, pulse, frame_error = IDLE, 0, 1
     elif s.phase == CONVERTING:
-        if eoc and s.pulse == 0:
+        if x.eoc and s.pulse == 0:
             done = s.done + 1
-            if s.done + 1 >= conversions:
+            if s.done + 1 >= r.conversions:
                 phase, done = ASKING, 0
             else:
                 pulse = CONVST_CLOCKS
     elif s.phase == ASKING:
         phase, den = READING, 1
-    elif drdy:
-        done, phase = s.done + 1, ENDING if s.done + 1 >= channels else ASKING
-        read_0 = drp_do if s.done == 0 else s.read_0
-        read_1 = drp_do if s.done == 1 else s.read_1
-        read_2 = drp_do if s.done == 2 else s.read_2
-        read_3 = drp_do if s.done == 3 else s.read_3
-    if sample_trigger and (s.phase != IDLE or busy):
+    elif x.drdy:
+        done, phase = s.done + 1, ENDING if s.done + 1 >= r.channels else ASKING
+        read_0 = x.drp_do if s.done == 0 else s.read_0
+        read_1 = x.drp_do if s.done == 1 else s.read_1
+        read_2 = x.drp_do if s.done == 2 else s.read_2
+        read_3 = x.drp_do if s.done == 3 else s.read_3
+    if x.sample_trigger and (s.phase != IDLE or x.busy):
         frame_error = 1
 
-    daddr = address_0 if s.done == 0 else address_1 if s.done == 1 else address_2 if s.done == 2 else address_3
+    daddr = r.address_0 if s.done == 0 else r.address_1 if s.done == 1 else r.address_2 if s.done == 2 else r.address_3
     following = State(phase, elapsed, pulse, done, read_0, read_1, read_2, read_3, code_0, code_1, code_2, code_3)
     return following, (1 if pulse else 0, den, daddr, codes_valid, frame_error, code_0, code_1, code_2, code_3)
 
@@ -146,25 +145,31 @@ def patient_stimuli(rng, _config):
     return rows
 
 
+INPUTS = (
+    Port("sample_trigger", BIT, doc="1 for a clock: take a sample"),
+    Port("busy", BIT, doc="1: the XADC converts"),
+    Port("eoc", BIT, doc="1 for a clock: end of a conversion"),
+    Port("drdy", BIT, doc="1 for a clock: drp_do is valid"),
+    Port("drp_do", WORD, doc="data of the DRP"),
+)
+Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
+REGISTERS = (
+    Port("conversions", NUMBER, lo=1, hi=4, doc="conversions of a frame"),
+    Port("channels", NUMBER, lo=1, hi=4, doc="channels that are read"),
+    *(Port(f"address_{k}", ADDRESS, doc=f"DRP address of channel {k}") for k in range(4)),
+    Port("timeout", CLOCKS, doc="longest time of a frame, clocks"),
+    Port("signed_code", BIT, doc="1: the codes are two's complement"),
+)
+Registers = namedtuple("Registers", [p.name for p in REGISTERS])
+
 BLOCK = Block(
     name="xadc_reader",
     folder="converters",
     paper="none: front end of a board",
     step=step,
-    inputs=(
-        Port("sample_trigger", BIT, doc="1 for a clock: take a sample"),
-        Port("busy", BIT, doc="1: the XADC converts"),
-        Port("eoc", BIT, doc="1 for a clock: end of a conversion"),
-        Port("drdy", BIT, doc="1 for a clock: drp_do is valid"),
-        Port("drp_do", WORD, doc="data of the DRP"),
-    ),
-    registers=(
-        Port("conversions", NUMBER, lo=1, hi=4, doc="conversions of a frame"),
-        Port("channels", NUMBER, lo=1, hi=4, doc="channels that are read"),
-        *(Port(f"address_{k}", ADDRESS, doc=f"DRP address of channel {k}") for k in range(4)),
-        Port("timeout", CLOCKS, doc="longest time of a frame, clocks"),
-        Port("signed_code", BIT, doc="1: the codes are two's complement"),
-    ),
+    takes=(Inputs, Registers),
+    inputs=INPUTS,
+    registers=REGISTERS,
     outputs=(
         Port("convst", BIT, doc="rising edge: the inputs are held"),
         Port("den", BIT, doc="1 for a clock: read daddr"),

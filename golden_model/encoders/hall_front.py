@@ -5,6 +5,7 @@ Nothing is computed here.  ``sample_trigger`` latches the upper bits of theta_ha
 ``pole_pairs`` 1; the speed is that between two sectors, with ``k_edge`` for 6 counts a turn.
 """
 
+from collections import namedtuple
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
@@ -34,25 +35,23 @@ class State(NamedTuple):
 
 
 @kernel
-def step(
-    state, hall_a, hall_b, hall_c, sample_trigger, clear_encoder, filter_clocks, hall_reverse, hall_offset, start_first,
-    sector_counts, reverse, k_edge, position_bits,
-):  # fmt: skip
+def step(state, inputs, regs, position_bits):
+    x, r = inputs, regs
     s = state
-    filter_a, (_, _) = filter_step(s.of_filter_a, hall_a, filter_clocks)
-    filter_b, (_, _) = filter_step(s.of_filter_b, hall_b, filter_clocks)
-    filter_c, (_, _) = filter_step(s.of_filter_c, hall_c, filter_clocks)
+    filter_a, (_, _) = filter_step(s.of_filter_a, x.hall_a, r.filter_clocks)
+    filter_b, (_, _) = filter_step(s.of_filter_b, x.hall_b, r.filter_clocks)
+    filter_c, (_, _) = filter_step(s.of_filter_c, x.hall_c, r.filter_clocks)
     settled = 1 if s.of_filter_a.settled and s.of_filter_b.settled and s.of_filter_c.settled else 0
     decoder, (
         theta_hall, _, hall_valid, step_up, step_down, start_count, start_valid, illegal_count, skipped_count
     ) = hall_step(
-        s.of_decoder, s.of_filter_a.level, s.of_filter_b.level, s.of_filter_c.level, settled, clear_encoder,
-        hall_reverse, hall_offset, start_first, sector_counts,
+        s.of_decoder, s.of_filter_a.level, s.of_filter_b.level, s.of_filter_c.level, settled, x.clear_encoder,
+        r.hall_reverse, r.hall_offset, r.start_first, r.sector_counts,
     )  # fmt: skip
     timer, (omega_me, omega_valid) = timer_step(
-        s.of_timer, s.step_up, s.step_down, sample_trigger, reverse, k_edge, TIME_W, MOVED_W
+        s.of_timer, s.step_up, s.step_down, x.sample_trigger, r.reverse, r.k_edge, TIME_W, MOVED_W
     )
-    code = s.theta_hall >> (TURN_W - position_bits) if sample_trigger else s.code
+    code = s.theta_hall >> (TURN_W - position_bits) if x.sample_trigger else s.code
     following = State(filter_a, filter_b, filter_c, decoder, timer, code, theta_hall, step_up, step_down)
     return following, (
         code, omega_me, omega_valid, hall_valid, start_count, start_valid, illegal_count, skipped_count,
@@ -107,17 +106,23 @@ _PORTS = {
 }
 REGISTERS = tuple(_PORTS[n] for n in ("filter_clocks", "hall_reverse", "hall_offset", "start_first", "sector_counts"))
 
+INPUTS = (
+    *(Port(f"hall_{x}", BIT, doc=f"Hall sensor {x}, asynchronous pin") for x in "abc"),
+    Port("sample_trigger", BIT, doc="1: a sample begins"),
+    Port("clear_encoder", BIT, doc="1: clear the encoder's faults and counters"),
+)
+Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
+ALL_REGISTERS = REGISTERS + (_PORTS["reverse"], _PORTS["k_edge"])
+Registers = namedtuple("Registers", [p.name for p in ALL_REGISTERS])
+
 BLOCK = Block(
     name="hall_front",
     folder="encoders",
     paper="none: three Hall sensors, 120 degrees apart",
     step=step,
-    inputs=(
-        *(Port(f"hall_{x}", BIT, doc=f"Hall sensor {x}, asynchronous pin") for x in "abc"),
-        Port("sample_trigger", BIT, doc="1: a sample begins"),
-        Port("clear_encoder", BIT, doc="1: clear the encoder's faults and counters"),
-    ),
-    registers=REGISTERS + (_PORTS["reverse"], _PORTS["k_edge"]),
+    takes=(Inputs, Registers),
+    inputs=INPUTS,
+    registers=ALL_REGISTERS,
     outputs=(Port("code_theta", Format(0, 0, 16), doc="angle of the sector, latched by the trigger"),)
     + tuple(_PORTS[n] for n in ("omega_me", "omega_valid", "hall_valid", "start_count", "start_valid"))
     + tuple(_PORTS[n] for n in ("illegal_count", "skipped_count")),

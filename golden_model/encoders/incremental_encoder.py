@@ -5,6 +5,7 @@ Nothing is computed here.  The blocks are one register apart, as in the VHDL: a 
 one clock after the decoder has seen it.  From a pin to the count: filter_clocks + 5 clocks, to the code one more.
 """
 
+from collections import namedtuple
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
@@ -40,29 +41,12 @@ class State(NamedTuple):
 
 
 @kernel
-def step(
-    state,
-    pin_a,
-    pin_b,
-    pin_z,
-    sample,
-    start,
-    start_count,
-    clear_faults,
-    filter_clocks,
-    index_phase,
-    counts,
-    code_step,
-    code_rest,
-    correct_max,
-    reverse,
-    k_edge,
-    position_bits,
-):
+def step(state, inputs, regs, position_bits):
+    x, r = inputs, regs
     s = state
-    filter_a, (_, _) = filter_step(s.of_filter_a, pin_a, filter_clocks)
-    filter_b, (_, _) = filter_step(s.of_filter_b, pin_b, filter_clocks)
-    filter_z, (_, _) = filter_step(s.of_filter_z, pin_z, filter_clocks)
+    filter_a, (_, _) = filter_step(s.of_filter_a, x.pin_a, r.filter_clocks)
+    filter_b, (_, _) = filter_step(s.of_filter_b, x.pin_b, r.filter_clocks)
+    filter_z, (_, _) = filter_step(s.of_filter_z, x.pin_z, r.filter_clocks)
     settled = 1 if s.of_filter_a.settled and s.of_filter_b.settled and s.of_filter_z.settled else 0
 
     decoder, (step_up, step_down, forward, index, _, illegal_count) = decoder_step(
@@ -71,20 +55,20 @@ def step(
         s.of_filter_b.level,
         s.of_filter_z.level,
         settled,
-        clear_faults,
-        index_phase,
+        x.clear_faults,
+        r.index_phase,
     )
     counter, (code_theta, count, pending, moving, restarted, setting_refused) = counter_step(
         s.of_counter,
         s.step_up,
         s.step_down,
-        sample,
+        x.sample,
         s.correct,
         s.correction,
         s.fast,
-        counts,
-        code_step,
-        code_rest,
+        r.counts,
+        r.code_step,
+        r.code_rest,
         position_bits,
     )
     check, (correct, correction, fast, referenced, index_count, lost_counts, index_lost, index_wrong) = check_step(
@@ -92,15 +76,15 @@ def step(
         s.index,
         s.count,
         s.pending,
-        start,
-        start_count,
+        x.start,
+        x.start_count,
         s.restarted,
-        clear_faults,
-        counts,
-        correct_max,
+        x.clear_faults,
+        r.counts,
+        r.correct_max,
     )
     timer, (omega_me, omega_valid) = timer_step(
-        s.of_timer, s.step_up, s.step_down, sample, reverse, k_edge, TIME_W, MOVED_W
+        s.of_timer, s.step_up, s.step_down, x.sample, r.reverse, r.k_edge, TIME_W, MOVED_W
     )
     following = State(
         filter_a,
@@ -216,30 +200,36 @@ _PORTS = {
     for p in module.BLOCK.inputs + module.BLOCK.registers + module.BLOCK.outputs
 }
 
+INPUTS = (
+    Port("pin_a", BIT, doc="A, asynchronous pin"),
+    Port("pin_b", BIT, doc="B, asynchronous pin"),
+    Port("pin_z", BIT, doc="Z, asynchronous pin"),
+    *(_PORTS[name] for name in ("sample", "start", "start_count", "clear_faults")),
+)
+Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
+REGISTERS = tuple(
+    _PORTS[name]
+    for name in (
+        "filter_clocks",
+        "index_phase",
+        "counts",
+        "code_step",
+        "code_rest",
+        "correct_max",
+        "reverse",
+        "k_edge",
+    )
+)
+Registers = namedtuple("Registers", [p.name for p in REGISTERS])
+
 BLOCK = Block(
     name="incremental_encoder",
     folder="encoders",
     paper="none: incremental encoder",
     step=step,
-    inputs=(
-        Port("pin_a", BIT, doc="A, asynchronous pin"),
-        Port("pin_b", BIT, doc="B, asynchronous pin"),
-        Port("pin_z", BIT, doc="Z, asynchronous pin"),
-        *(_PORTS[name] for name in ("sample", "start", "start_count", "clear_faults")),
-    ),
-    registers=tuple(
-        _PORTS[name]
-        for name in (
-            "filter_clocks",
-            "index_phase",
-            "counts",
-            "code_step",
-            "code_rest",
-            "correct_max",
-            "reverse",
-            "k_edge",
-        )
-    ),
+    takes=(Inputs, Registers),
+    inputs=INPUTS,
+    registers=REGISTERS,
     outputs=tuple(
         _PORTS[name]
         for name in (

@@ -13,6 +13,7 @@ Encoder 3: the count starts from the Hall sensors when they are valid and the se
 Formats: those of the blocks.
 """
 
+from collections import namedtuple
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
@@ -48,16 +49,12 @@ class State(NamedTuple):
 
 
 @kernel
-def step(
-    state, pin_a, pin_b, pin_z, hall_a, hall_b, hall_c, serial_data, position_in, sample_trigger, codes_valid,
-    clear_encoder, omega_set, reverse, filter_clocks, index_phase, counts, code_step, code_rest, correct_max, k_edge,
-    hall_reverse, hall_offset, start_first, sector_counts, half_period, encoder_bits, turn_bits, gray, parity_on,
-    crc_on, start_max, mode_command, two_errors, position_delay, bridge_max, encoder, position_bits,
-):  # fmt: skip
+def step(state, inputs, regs, encoder, position_bits):
+    x, r = inputs, regs
     s = state
-    trigger = sample_trigger
+    trigger = x.sample_trigger
     abz, hall, serial = s.of_abz, s.of_hall, s.of_serial
-    code, omega, done, count, moving, refused = s.code, omega_set, 0, 0, 0, 0
+    code, omega, done, count, moving, refused = s.code, x.omega_set, 0, 0, 0, 0
     forward, referenced, index_count, illegals, lost, index_lost, index_wrong = 0, 0, 0, 0, 0, 0, 0
     hall_code, hall_omega, hall_done, hall_valid, start_count, start_valid, hall_illegals = 0, 0, 0, 0, 0, 0, 0
     serial_clock, data_out, data_drive, position_valid, position_lost, bridged, alarm, warning = 1, 0, 0, 0, 0, 0, 0, 0
@@ -65,54 +62,76 @@ def step(
 
     if encoder == HALL or encoder == HALL_ABZ:
         hall, (hall_code, hall_omega, hall_done, hall_valid, start_count, start_valid, hall_illegals, _) = hall_step(
-            s.of_hall, hall_a, hall_b, hall_c, trigger, clear_encoder, filter_clocks, hall_reverse, hall_offset,
-            start_first, sector_counts, reverse, k_edge, position_bits,
+            s.of_hall,
+            x,
+            hall_front.Registers(
+                filter_clocks=r.filter_clocks, hall_reverse=r.hall_reverse, hall_offset=r.hall_offset,
+                start_first=r.start_first, sector_counts=r.sector_counts, reverse=x.reverse, k_edge=r.k_edge,
+            ),
+            position_bits,
         )  # fmt: skip
     if encoder == ABZ or encoder == HALL_ABZ:
         abz, (
             code, omega, done, count, forward, referenced, moving, index_count, illegals, lost, index_lost, index_wrong,
             refused,
         ) = abz_step(
-            s.of_abz, pin_a, pin_b, pin_z, trigger, start, s.start_count, clear_encoder, filter_clocks, index_phase,
-            counts, code_step, code_rest, correct_max, reverse, k_edge, position_bits,
+            s.of_abz,
+            incremental_encoder.Inputs(
+                pin_a=x.pin_a, pin_b=x.pin_b, pin_z=x.pin_z, sample=trigger, start=start, start_count=s.start_count,
+                clear_faults=x.clear_encoder,
+            ),
+            incremental_encoder.Registers(
+                filter_clocks=r.filter_clocks, index_phase=r.index_phase, counts=r.counts, code_step=r.code_step,
+                code_rest=r.code_rest, correct_max=r.correct_max, reverse=x.reverse, k_edge=r.k_edge,
+            ),
+            position_bits,
         )  # fmt: skip
     elif encoder == HALL:
         code, omega, done, illegals = hall_code, hall_omega, hall_done, hall_illegals
     elif encoder == EXTERNAL:
-        code, done = position_in if trigger else s.code, trigger
+        code, done = x.position_in if trigger else s.code, trigger
     else:
-        serial, (
-            serial_clock, data_out, data_drive, code, done, position_valid, position_lost, bridged, alarm, warning,
-        ) = serial_step(
-            s.of_serial, serial_data, trigger, codes_valid, clear_encoder, half_period, encoder_bits, turn_bits, gray,
-            parity_on, crc_on, start_max, mode_command, two_errors, position_delay, bridge_max, encoder, position_bits,
-        )  # fmt: skip
+        serial, out = serial_step(s.of_serial, x, r, encoder, position_bits)
+        serial_clock, data_out, data_drive, code, done, position_valid, position_lost, bridged, alarm, warning = out
 
     on_the_way = 1 if s.moved or s.moving else 0
     following = State(
-        abz,
-        hall,
-        serial,
-        code,
-        s.abz_count if trigger else s.count,
-        0 if trigger else on_the_way,
-        on_the_way if trigger else s.restart,
-        0 if s.refused or clear_encoder else (1 if s.started or start else 0),
-        count,
-        moving,
-        refused,
-        start_count,
-        start_valid,
+        of_abz=abz,
+        of_hall=hall,
+        of_serial=serial,
+        code=code,
+        count=s.abz_count if trigger else s.count,
+        moved=0 if trigger else on_the_way,
+        restart=on_the_way if trigger else s.restart,
+        started=0 if s.refused or x.clear_encoder else (1 if s.started or start else 0),
+        abz_count=count,
+        moving=moving,
+        refused=refused,
+        start_count=start_count,
+        start_valid=start_valid,
     )
     flags = (
         referenced + (moving << 1) + (index_lost << 2) + (index_wrong << 3) + (refused << 4) + (hall_valid << 5)
         + (position_valid << 6) + (position_lost << 7) + (alarm << 8) + (warning << 9) + (forward << 10)
     )  # fmt: skip
     f = following
-    return following, (
-        code, f.restart, omega, done, f.count, flags, index_count, illegals, lost, bridged, index_wrong, position_lost,
-        serial_clock, data_out, data_drive,
-    )  # fmt: skip
+    return following, Outputs(
+        encoder_code=code,
+        encoder_restart=f.restart,
+        omega_now=omega,
+        position_done=done,
+        encoder_count=f.count,
+        encoder_flags=flags,
+        index_count=index_count,
+        illegal_count=illegals,
+        lost_counts=lost,
+        bridged_count=bridged,
+        index_wrong=index_wrong,
+        position_lost=position_lost,
+        serial_clock=serial_clock,
+        serial_out=data_out,
+        serial_drive=data_drive,
+    )
 
 
 def stimuli(rng, config):
@@ -158,54 +177,48 @@ _PORTS = {
     for p in module.BLOCK.inputs + module.BLOCK.registers + module.BLOCK.outputs
 }
 
+INPUTS = (
+    *(_PORTS[n] for n in ("pin_a", "pin_b", "pin_z")),
+    *(Port(f"hall_{x}", BIT, doc=f"Hall sensor {x}, asynchronous pin") for x in "abc"),
+    _PORTS["serial_data"],
+    Port("position_in", Format(0, 0, 16), doc="position code from elsewhere, latched by the trigger"),
+    *(_PORTS[n] for n in ("sample_trigger", "codes_valid", "clear_encoder")),
+    Port("omega_set", PU, doc="electrical speed, where the encoder has no edges"),
+    _PORTS["reverse"],
+)
+Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
+_INCREMENTAL = ("filter_clocks", "index_phase", "counts", "code_step", "code_rest", "correct_max", "k_edge")
+_HALL = ("hall_reverse", "hall_offset", "start_first", "sector_counts")
+REGISTERS = (*(_PORTS[n] for n in (*_INCREMENTAL, *_HALL)), *serial_encoder.REGISTERS)
+Registers = namedtuple("Registers", [p.name for p in REGISTERS])
+OUTPUTS = (
+    Port("encoder_code", Format(0, 0, 16), doc="position code of the encoder, latched by the trigger"),
+    Port("encoder_restart", BIT, doc="1: it has nothing to do with the one before"),
+    Port("omega_now", PU, doc="electrical speed between edges"),
+    Port("position_done", BIT, doc="1: position and speed are there"),
+    Port("encoder_count", COUNT, doc="count of the encoder, latched by the trigger"),
+    Port("encoder_flags", FLAGS, doc="flags of the encoder, see position_front"),
+    _PORTS["index_count"],
+    _PORTS["illegal_count"],
+    _PORTS["lost_counts"],
+    Port("bridged_count", EVENTS, doc="samples without a good frame, saturates"),
+    _PORTS["index_wrong"],
+    _PORTS["position_lost"],
+    Port("serial_clock", BIT, doc="clock line of a serial encoder, idle 1"),
+    Port("serial_out", BIT, doc="its data line as driven"),
+    Port("serial_drive", BIT, doc="1: drive its data line"),
+)
+Outputs = namedtuple("Outputs", [p.name for p in OUTPUTS])
+
 BLOCK = Block(
     name="position_front",
     folder="encoders",
     paper="none: front end of a board",
     step=step,
-    inputs=(
-        *(_PORTS[n] for n in ("pin_a", "pin_b", "pin_z")),
-        *(Port(f"hall_{x}", BIT, doc=f"Hall sensor {x}, asynchronous pin") for x in "abc"),
-        _PORTS["serial_data"],
-        Port("position_in", Format(0, 0, 16), doc="position code from elsewhere, latched by the trigger"),
-        *(_PORTS[n] for n in ("sample_trigger", "codes_valid", "clear_encoder")),
-        Port("omega_set", PU, doc="electrical speed, where the encoder has no edges"),
-        _PORTS["reverse"],
-    ),
-    registers=tuple(
-        _PORTS[n]
-        for n in (
-            "filter_clocks",
-            "index_phase",
-            "counts",
-            "code_step",
-            "code_rest",
-            "correct_max",
-            "k_edge",
-            "hall_reverse",
-            "hall_offset",
-            "start_first",
-            "sector_counts",
-        )
-    )
-    + serial_encoder.REGISTERS,
-    outputs=(
-        Port("encoder_code", Format(0, 0, 16), doc="position code of the encoder, latched by the trigger"),
-        Port("encoder_restart", BIT, doc="1: it has nothing to do with the one before"),
-        Port("omega_now", PU, doc="electrical speed between edges"),
-        Port("position_done", BIT, doc="1: position and speed are there"),
-        Port("encoder_count", COUNT, doc="count of the encoder, latched by the trigger"),
-        Port("encoder_flags", FLAGS, doc="flags of the encoder, see position_front"),
-        _PORTS["index_count"],
-        _PORTS["illegal_count"],
-        _PORTS["lost_counts"],
-        Port("bridged_count", EVENTS, doc="samples without a good frame, saturates"),
-        _PORTS["index_wrong"],
-        _PORTS["position_lost"],
-        Port("serial_clock", BIT, doc="clock line of a serial encoder, idle 1"),
-        Port("serial_out", BIT, doc="its data line as driven"),
-        Port("serial_drive", BIT, doc="1: drive its data line"),
-    ),
+    takes=(Inputs, Registers),
+    inputs=INPUTS,
+    registers=REGISTERS,
+    outputs=OUTPUTS,
     state=State(),
     latency=1,
     clocked=True,

@@ -5,6 +5,7 @@ Nothing is computed here.  A frame starts with ``sample_trigger``; the bridge's 
 codes, so a frame that has ended by then is this sample's.  ``encoder`` is 4 (SSI), 5 (BiSS-C) or 6 (EnDat).
 """
 
+from collections import namedtuple
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
@@ -30,29 +31,35 @@ class State(NamedTuple):
 
 
 @kernel
-def step(
-    state, serial_data, sample_trigger, codes_valid, clear_encoder, half_period, encoder_bits, turn_bits, gray,
-    parity_on, crc_on, start_max, mode_command, two_errors, position_delay, bridge_max, encoder, position_bits,
-):  # fmt: skip
+def step(state, inputs, regs, encoder, position_bits):
+    x, r = inputs, regs
     s = state
     ssi, biss, endat = s.of_ssi, s.of_biss, s.of_endat
     data_out, data_drive, alarm, warning = 0, 0, 0, 0
     if encoder == SSI:
         ssi, (serial_clock, code, code_valid, _, _) = ssi_step(
-            s.of_ssi, serial_data, sample_trigger, half_period, encoder_bits, turn_bits, gray, parity_on, position_bits
+            s.of_ssi,
+            x.serial_data,
+            x.sample_trigger,
+            r.half_period,
+            r.encoder_bits,
+            r.turn_bits,
+            r.gray,
+            r.parity_on,
+            position_bits,
         )
     elif encoder == BISS:
         biss, (serial_clock, code, code_valid, _, alarm, warning, _) = biss_step(
-            s.of_biss, serial_data, sample_trigger, half_period, encoder_bits, turn_bits, crc_on, start_max,
-            position_bits,
+            s.of_biss, x.serial_data, x.sample_trigger, r.half_period, r.encoder_bits, r.turn_bits, r.crc_on,
+            r.start_max, position_bits,
         )  # fmt: skip
     else:
         endat, (serial_clock, data_out, data_drive, code, code_valid, _, alarm, _) = endat_step(
-            s.of_endat, serial_data, sample_trigger, half_period, mode_command, two_errors, encoder_bits, turn_bits,
-            crc_on, start_max, position_bits,
+            s.of_endat, x.serial_data, x.sample_trigger, r.half_period, r.mode_command, r.two_errors, r.encoder_bits,
+            r.turn_bits, r.crc_on, r.start_max, position_bits,
         )  # fmt: skip
     bridge, (code_theta, code_done, position_valid, position_lost, bridged_count) = bridge_step(
-        s.of_bridge, s.code, s.code_valid, codes_valid, clear_encoder, position_delay, bridge_max, position_bits
+        s.of_bridge, s.code, s.code_valid, x.codes_valid, x.clear_encoder, r.position_delay, r.bridge_max, position_bits
     )
     following = State(ssi, biss, endat, bridge, code, code_valid)
     return following, (
@@ -103,17 +110,22 @@ REGISTERS = (
     _BRIDGE["bridge_max"],
 )
 
+INPUTS = (
+    Port("serial_data", BIT, doc="data line, asynchronous pin"),
+    Port("sample_trigger", BIT, doc="1: read the position"),
+    Port("codes_valid", BIT, doc="1: the codes of the converters are there"),
+    Port("clear_encoder", BIT, doc="1: clear the encoder's faults and counters"),
+)
+Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
+Registers = namedtuple("Registers", [p.name for p in REGISTERS])
+
 BLOCK = Block(
     name="serial_encoder",
     folder="encoders",
     paper="none: absolute encoders",
     step=step,
-    inputs=(
-        Port("serial_data", BIT, doc="data line, asynchronous pin"),
-        Port("sample_trigger", BIT, doc="1: read the position"),
-        Port("codes_valid", BIT, doc="1: the codes of the converters are there"),
-        Port("clear_encoder", BIT, doc="1: clear the encoder's faults and counters"),
-    ),
+    takes=(Inputs, Registers),
+    inputs=INPUTS,
     registers=REGISTERS,
     outputs=(
         Port("serial_clock", BIT, doc="clock line, idle 1"),

@@ -19,6 +19,7 @@ FLUX; times factor, rounded half up; the decay likewise.  Saturation at 2 per un
 have, but reached at low speed by a small voltage error; reported by ``delta_limited`` unless the weight is zero.
 """
 
+from collections import namedtuple
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
@@ -56,18 +57,19 @@ def axis(u_int, i, factor, n, r):
 
 
 @kernel
-def step(state, u_int_d, u_int_q, i_d, i_q, sat_d, sat_q, current_at_rail, voltage_known, run, factor, n_omega, r):
-    delta_d, limited_d = axis(state.u_int_q_2, i_q, factor, n_omega, r)
-    delta_q, limited_q = axis(state.u_int_d_2, i_d, -factor, n_omega, r)
+def step(state, inputs):
+    x = inputs
+    delta_d, limited_d = axis(state.u_int_q_2, x.i_q, x.factor, x.n_omega, x.r)
+    delta_q, limited_q = axis(state.u_int_d_2, x.i_d, -x.factor, x.n_omega, x.r)
     limited = limited_d | limited_q
-    held = 1 if run and (sat_d != 0 or sat_q != 0 or current_at_rail != 0 or not voltage_known) else 0
+    held = 1 if x.run and (x.sat_d != 0 or x.sat_q != 0 or x.current_at_rail != 0 or not x.voltage_known) else 0
     if held:
         delta_d = state.delta_d - round_half_up(state.delta_d, FADE)
         delta_q = state.delta_q - round_half_up(state.delta_q, FADE)
         limited = 0
-    if not run:
+    if not x.run:
         delta_d, delta_q, limited = 0, 0, 0
-    state = State(delta_d, delta_q, u_int_d, u_int_q, state.u_int_d_1, state.u_int_q_1)
+    state = State(delta_d, delta_q, x.u_int_d, x.u_int_q, state.u_int_d_1, state.u_int_q_1)
     return state, (delta_d, delta_q, held, limited)
 
 
@@ -118,24 +120,28 @@ DELTA = (
     Port("delta_held", BIT, doc="1: held, the integrals do not show the flux error"),
 )
 
+INPUTS = (
+    Port("u_int_d", INTEGRAL, doc="integral part of the regulator, d axis"),
+    Port("u_int_q", INTEGRAL, doc="integral part of the regulator, q axis"),
+    Port("i_d", PU, doc="current, d axis"),
+    Port("i_q", PU, doc="current, q axis"),
+    Port("sat_d", SAT, lo=-1, hi=1, doc="active limit, d axis: 1 upper, -1 lower, 0 none"),
+    Port("sat_q", SAT, lo=-1, hi=1, doc="active limit, q axis: 1 upper, -1 lower, 0 none"),
+    Port("current_at_rail", Format(0, 3, 0), doc="bit x: ADC code of phase x at either end"),
+    Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
+    Port("run", BIT, doc="1: the gates are switching"),
+    *speed_reciprocal.OUTPUTS,
+    R,
+)
+Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
+
 BLOCK = Block(
     name="delta_lambda",
     folder="estimators",
     paper="001, eq. (15); 'delta lambda_dq' of Fig. 8",
     step=step,
-    inputs=(
-        Port("u_int_d", INTEGRAL, doc="integral part of the regulator, d axis"),
-        Port("u_int_q", INTEGRAL, doc="integral part of the regulator, q axis"),
-        Port("i_d", PU, doc="current, d axis"),
-        Port("i_q", PU, doc="current, q axis"),
-        Port("sat_d", SAT, lo=-1, hi=1, doc="active limit, d axis: 1 upper, -1 lower, 0 none"),
-        Port("sat_q", SAT, lo=-1, hi=1, doc="active limit, q axis: 1 upper, -1 lower, 0 none"),
-        Port("current_at_rail", Format(0, 3, 0), doc="bit x: ADC code of phase x at either end"),
-        Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
-        Port("run", BIT, doc="1: the gates are switching"),
-        *speed_reciprocal.OUTPUTS,
-        R,
-    ),
+    takes=(Inputs,),
+    inputs=INPUTS,
     outputs=(*DELTA, Port("delta_limited", BIT, doc="delta lambda reached its range")),
     state=State(),
     latency=12,

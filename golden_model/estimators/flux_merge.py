@@ -28,6 +28,7 @@ unit; not reached by a drive within its bases.  ``merge_limited`` reports it, an
 time constant.  y needs none: |eps| <= 2 and w < 1/4.
 """
 
+from collections import namedtuple
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
@@ -91,21 +92,19 @@ def axis(carried, x, i, lambda_c, u, trusted, rho, omega_0, xi, t_s):
 
 
 @kernel
-def step(
-    state, i_alpha, i_beta, lambda_c_alpha, lambda_c_beta, u_applied_alpha, u_applied_beta, voltage_known, run,
-    rho, omega_0, xi, t_s,
-):  # fmt: skip
-    trusted, gains = state.known & run, (rho, omega_0, xi, t_s)
+def step(state, inputs, regs):
+    x, r = inputs, regs
+    trusted, gains = state.known & x.run, (x.rho, r.omega_0, r.xi, r.t_s)
     lambda_alpha, x_alpha, limited_alpha = axis(
-        state.lambda_alpha, state.x_alpha, i_alpha, lambda_c_alpha, u_applied_alpha, trusted, *gains
+        state.lambda_alpha, state.x_alpha, x.i_alpha, x.lambda_c_alpha, x.u_applied_alpha, trusted, *gains
     )
     lambda_beta, x_beta, limited_beta = axis(
-        state.lambda_beta, state.x_beta, i_beta, lambda_c_beta, u_applied_beta, trusted, *gains
+        state.lambda_beta, state.x_beta, x.i_beta, x.lambda_c_beta, x.u_applied_beta, trusted, *gains
     )
     lambda_m_alpha = round_sat(lambda_alpha, FLUX_TO_STATE, FLUX_W)
     lambda_m_beta = round_sat(lambda_beta, FLUX_TO_STATE, FLUX_W)
-    state = State(lambda_alpha, lambda_beta, x_alpha, x_beta, voltage_known)
-    return state, (lambda_m_alpha, lambda_m_beta, voltage_known, limited_alpha | limited_beta)
+    state = State(lambda_alpha, lambda_beta, x_alpha, x_beta, x.voltage_known)
+    return state, (lambda_m_alpha, lambda_m_beta, x.voltage_known, limited_alpha | limited_beta)
 
 
 def reference(v, state):
@@ -160,27 +159,33 @@ def stimuli(rng, _config):
     return rows
 
 
+INPUTS = (
+    Port("i_alpha", PU, doc="current, alpha"),
+    Port("i_beta", PU, doc="current, beta"),
+    Port("lambda_c_alpha", FLUX, doc="flux linkage of the current model, alpha"),
+    Port("lambda_c_beta", FLUX, doc="flux linkage of the current model, beta"),
+    Port("u_applied_alpha", FLUX, doc="voltage of the coming period, alpha"),
+    Port("u_applied_beta", FLUX, doc="voltage of the coming period, beta"),
+    Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
+    Port("run", BIT, doc="1: the gates are switching"),
+    RHO,
+)
+Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
+REGISTERS = (
+    Port("omega_0", OMEGA_0, lo=1 << 8, doc="crossover of the two models, times the sample time"),
+    Port("xi", XI, lo=1 << 12, hi=1 << 15, doc="damping of the merge"),
+    T_S,
+)
+Registers = namedtuple("Registers", [p.name for p in REGISTERS])
+
 BLOCK = Block(
     name="flux_merge",
     folder="estimators",
     paper="001, eq. (7); 'Merge of voltage and current models' of Fig. 8",
     step=step,
-    inputs=(
-        Port("i_alpha", PU, doc="current, alpha"),
-        Port("i_beta", PU, doc="current, beta"),
-        Port("lambda_c_alpha", FLUX, doc="flux linkage of the current model, alpha"),
-        Port("lambda_c_beta", FLUX, doc="flux linkage of the current model, beta"),
-        Port("u_applied_alpha", FLUX, doc="voltage of the coming period, alpha"),
-        Port("u_applied_beta", FLUX, doc="voltage of the coming period, beta"),
-        Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
-        Port("run", BIT, doc="1: the gates are switching"),
-        RHO,
-    ),
-    registers=(
-        Port("omega_0", OMEGA_0, lo=1 << 8, doc="crossover of the two models, times the sample time"),
-        Port("xi", XI, lo=1 << 12, hi=1 << 15, doc="damping of the merge"),
-        T_S,
-    ),
+    takes=(Inputs, Registers),
+    inputs=INPUTS,
+    registers=REGISTERS,
     outputs=(
         *LAMBDA_M,
         Port("merge_known", BIT, doc="1: the merged flux is valid at the next sample"),

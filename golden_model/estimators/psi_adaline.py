@@ -13,6 +13,7 @@ Formats: v_leg*d_q and r*i_q to FLUX, l_d*i_d to FLUX, saturated; their product 
 omega*e FLUX; psi_m S(1,34), so that an eta of 1e-4 per unit still moves it by an LSB of omega*e; out PU.  All half up.
 """
 
+from collections import namedtuple
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
@@ -53,22 +54,20 @@ class State(NamedTuple):
 
 
 @kernel
-def step(
-    state, u_q, d_q, v_leg, i_d, i_q, r, omega_chord, sat_d, sat_q, current_at_rail, voltage_known, run,
-    l_d, eta_psi, omega_psi_min,
-):  # fmt: skip
-    own = round_sat(l_d * i_d, DROP_L, FLUX_W)
+def step(state, inputs, regs):
+    x, r = inputs, regs
+    own = round_sat(r.l_d * x.i_d, DROP_L, FLUX_W)
     flux = saturate(own + round_sat(state.psi_m, TO_FLUX, FLUX_W), FLUX_W)
-    after_v = (u_q << PU_TO_FLUX) - round_half_up(v_leg * d_q, DROP_V)
-    rest = after_v - round_half_up(r * i_q, DROP_R)
-    e, _ = multiply_subtract(flux, omega_chord, rest, DROP_OMEGA, FLUX_W)
-    pull = round_sat(e * omega_chord, DROP_OMEGA, FLUX_W)
+    after_v = (x.u_q << PU_TO_FLUX) - round_half_up(x.v_leg * x.d_q, DROP_V)
+    rest = after_v - round_half_up(x.r * x.i_q, DROP_R)
+    e, _ = multiply_subtract(flux, x.omega_chord, rest, DROP_OMEGA, FLUX_W)
+    pull = round_sat(e * x.omega_chord, DROP_OMEGA, FLUX_W)
     held = 1
-    if run and voltage_known and sat_d == 0 and sat_q == 0 and current_at_rail == 0:
-        held = 1 if abs(omega_chord) < omega_psi_min else 0
+    if x.run and x.voltage_known and x.sat_d == 0 and x.sat_q == 0 and x.current_at_rail == 0:
+        held = 1 if abs(x.omega_chord) < r.omega_psi_min else 0
     psi = state.psi_m
     if not held:
-        psi, _ = multiply_add(pull, eta_psi, psi, DROP_ETA, PSI_STATE_W)
+        psi, _ = multiply_add(pull, r.eta_psi, psi, DROP_ETA, PSI_STATE_W)
     return State(psi), (round_sat(psi, TO_PU, PU_W), held)
 
 
@@ -150,30 +149,36 @@ def patient_stimuli(rng, _config):
     return rows
 
 
+INPUTS = (
+    Port("u_q", PU, doc="voltage, q axis"),
+    D_Q,
+    V_LEG_PORT,
+    Port("i_d", PU, doc="current, d axis"),
+    Port("i_q", PU, doc="current, q axis"),
+    R,
+    Port("omega_chord", PU, doc="electrical speed along the chord of a sample"),
+    Port("sat_d", SAT, lo=-1, hi=1, doc="active limit, d axis: 1 upper, -1 lower, 0 none"),
+    Port("sat_q", SAT, lo=-1, hi=1, doc="active limit, q axis: 1 upper, -1 lower, 0 none"),
+    Port("current_at_rail", Format(0, 3, 0), doc="bit x: ADC code of phase x at either end"),
+    Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
+    Port("run", BIT, doc="1: the gates are switching"),
+)
+Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
+REGISTERS = (
+    L_D,
+    Port("eta_psi", ETA_PSI, doc="step of the psi_m Adaline, 2*eta per unit"),
+    Port("omega_psi_min", Format(0, 1, 16), doc="psi_m is held below this speed"),
+)
+Registers = namedtuple("Registers", [p.name for p in REGISTERS])
+
 BLOCK = Block(
     name="psi_adaline",
     folder="estimators",
     paper="000, eq. (13), with the reluctance term of eq. (7b)",
     step=step,
-    inputs=(
-        Port("u_q", PU, doc="voltage, q axis"),
-        D_Q,
-        V_LEG_PORT,
-        Port("i_d", PU, doc="current, d axis"),
-        Port("i_q", PU, doc="current, q axis"),
-        R,
-        Port("omega_chord", PU, doc="electrical speed along the chord of a sample"),
-        Port("sat_d", SAT, lo=-1, hi=1, doc="active limit, d axis: 1 upper, -1 lower, 0 none"),
-        Port("sat_q", SAT, lo=-1, hi=1, doc="active limit, q axis: 1 upper, -1 lower, 0 none"),
-        Port("current_at_rail", Format(0, 3, 0), doc="bit x: ADC code of phase x at either end"),
-        Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
-        Port("run", BIT, doc="1: the gates are switching"),
-    ),
-    registers=(
-        L_D,
-        Port("eta_psi", ETA_PSI, doc="step of the psi_m Adaline, 2*eta per unit"),
-        Port("omega_psi_min", Format(0, 1, 16), doc="psi_m is held below this speed"),
-    ),
+    takes=(Inputs, Registers),
+    inputs=INPUTS,
+    registers=REGISTERS,
     outputs=(
         Port("psi_m", PU, doc="flux linkage of the magnets"),
         Port("psi_held", BIT, doc="1: psi_m is held"),

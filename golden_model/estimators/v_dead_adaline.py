@@ -24,6 +24,7 @@ v_sum S(-1,38), where an eta of 1e-6 and an error of 2**-22 still change them (d
 All rounded half up.  Limits: v_dead within +-v_comp_max, v_sum and v_comp from zero to v_comp_max, v_leg saturated.
 """
 
+from collections import namedtuple
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
@@ -86,34 +87,32 @@ def low_pass(lp, x, k_lp):
 
 
 @kernel
-def step(
-    state, u_pi_d, d_d, i_d, i_q, sat_d, sat_q, current_at_rail, voltage_known, run,
-    k_lp, eta_v, gamma, zeta, v_thr, v_comp_max, i_learn, compensate,
-):  # fmt: skip
-    calm = run and sat_d == 0 and sat_q == 0 and current_at_rail == 0 and voltage_known
-    learning = 1 if calm and abs(i_d) + abs(i_q) >= i_learn else 0
-    limit = v_comp_max << TO_LEG
-    lp_d, d_h = low_pass(state.lp_d, d_d, k_lp)
-    lp_u, u_h = low_pass(state.lp_u, u_pi_d, k_lp)
-    if not run:
+def step(state, inputs, regs):
+    x, r = inputs, regs
+    calm = x.run and x.sat_d == 0 and x.sat_q == 0 and x.current_at_rail == 0 and x.voltage_known
+    learning = 1 if calm and abs(x.i_d) + abs(x.i_q) >= r.i_learn else 0
+    limit = r.v_comp_max << TO_LEG
+    lp_d, d_h = low_pass(state.lp_d, x.d_d, r.k_lp)
+    lp_u, u_h = low_pass(state.lp_u, x.u_pi_d, r.k_lp)
+    if not x.run:
         lp_u, lp_d = 0, 0
     fine = round_half_up(state.v_dead, DROP_FINE)
     e, _ = multiply_subtract(fine, d_h, u_h << PU_TO_FLUX, DROP_MODEL, FLUX_W)
     pull = round_sat(d_h * e, DROP_STEP, STEP_W)
     v_dead = state.v_dead
     if learning:
-        v_dead = clamp(v_dead + round_half_up(pull * eta_v, DROP_ETA), -limit, limit)
+        v_dead = clamp(v_dead + round_half_up(pull * r.eta_v, DROP_ETA), -limit, limit)
     fine = round_half_up(v_dead, DROP_FINE)
     v_sum = state.v_sum
-    if not compensate:
+    if not r.compensate:
         v_sum = 0
-    elif learning and abs(fine) > (v_thr << FINE_TO_LEG):
-        v_sum += round_half_up(fine * zeta, DROP_ZETA)
+    elif learning and abs(fine) > (r.v_thr << FINE_TO_LEG):
+        v_sum += round_half_up(fine * r.zeta, DROP_ZETA)
     v_sum = clamp(v_sum, 0, limit)
-    asked = v_sum + round_half_up(fine * gamma, DROP_GAMMA)
-    v_comp = round_half_up(clamp(asked, 0, limit), TO_LEG) if compensate else 0
+    asked = v_sum + round_half_up(fine * r.gamma, DROP_GAMMA)
+    v_comp = round_half_up(clamp(asked, 0, limit), TO_LEG) if r.compensate else 0
     v_leg = saturate(v_comp + round_half_up(fine, FINE_TO_LEG), V_LEG_W)
-    limited = 1 if compensate and asked > limit else 0
+    limited = 1 if r.compensate and asked > limit else 0
     return State(lp_u, lp_d, v_dead, v_sum), (round_half_up(fine, FINE_TO_LEG), v_comp, v_leg, limited)
 
 
@@ -209,32 +208,38 @@ V_DEAD = Port("v_dead", V_LEG, doc="leg voltage loss that is not compensated")
 V_COMP = Port("v_comp", V_LEG, doc="leg voltage that is compensated")
 V_LEG_PORT = Port("v_leg", V_LEG, doc="leg voltage loss by dead time and device drops")
 
+INPUTS = (
+    Port("u_pi_d", PU, doc="output of the current regulator, d axis"),
+    D_D,
+    Port("i_d", PU, doc="current, d axis"),
+    Port("i_q", PU, doc="current, q axis"),
+    Port("sat_d", SAT, lo=-1, hi=1, doc="active limit, d axis: 1 upper, -1 lower, 0 none"),
+    Port("sat_q", SAT, lo=-1, hi=1, doc="active limit, q axis: 1 upper, -1 lower, 0 none"),
+    Port("current_at_rail", Format(0, 3, 0), doc="bit x: ADC code of phase x at either end"),
+    Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
+    Port("run", BIT, doc="1: the gates are switching"),
+)
+Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
+REGISTERS = (
+    Port("k_lp", K_LP, doc="weight of a new sample in the low-pass of Fig. 3"),
+    Port("eta_v", ETA_V, hi=ETA_V_MAX, doc="step of the V_dead Adaline, 18*eta"),
+    Port("gamma", GAMMA, doc="proportional part of the compensation"),
+    Port("zeta", ZETA, doc="gain of the minimisation per sample"),
+    Port("v_thr", V_LEVEL, doc="no minimisation below this |v_dead|"),
+    Port("v_comp_max", V_LEVEL, doc="largest leg voltage that is compensated"),
+    Port("i_learn", Format(0, 1, 16), doc="the V_dead Adaline is held below this |i_d| + |i_q|"),
+    Port("compensate", BIT, doc="1: compensate dead time and drops"),
+)
+Registers = namedtuple("Registers", [p.name for p in REGISTERS])
+
 BLOCK = Block(
     name="v_dead_adaline",
     folder="estimators",
     paper="000, eq. (10) and Fig. 4(a)",
     step=step,
-    inputs=(
-        Port("u_pi_d", PU, doc="output of the current regulator, d axis"),
-        D_D,
-        Port("i_d", PU, doc="current, d axis"),
-        Port("i_q", PU, doc="current, q axis"),
-        Port("sat_d", SAT, lo=-1, hi=1, doc="active limit, d axis: 1 upper, -1 lower, 0 none"),
-        Port("sat_q", SAT, lo=-1, hi=1, doc="active limit, q axis: 1 upper, -1 lower, 0 none"),
-        Port("current_at_rail", Format(0, 3, 0), doc="bit x: ADC code of phase x at either end"),
-        Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
-        Port("run", BIT, doc="1: the gates are switching"),
-    ),
-    registers=(
-        Port("k_lp", K_LP, doc="weight of a new sample in the low-pass of Fig. 3"),
-        Port("eta_v", ETA_V, hi=ETA_V_MAX, doc="step of the V_dead Adaline, 18*eta"),
-        Port("gamma", GAMMA, doc="proportional part of the compensation"),
-        Port("zeta", ZETA, doc="gain of the minimisation per sample"),
-        Port("v_thr", V_LEVEL, doc="no minimisation below this |v_dead|"),
-        Port("v_comp_max", V_LEVEL, doc="largest leg voltage that is compensated"),
-        Port("i_learn", Format(0, 1, 16), doc="the V_dead Adaline is held below this |i_d| + |i_q|"),
-        Port("compensate", BIT, doc="1: compensate dead time and drops"),
-    ),
+    takes=(Inputs, Registers),
+    inputs=INPUTS,
+    registers=REGISTERS,
     outputs=(
         V_DEAD,
         V_COMP,

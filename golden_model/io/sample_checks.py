@@ -18,6 +18,7 @@ current trips one LSB (16 bits) later than a positive one, the sum at most 3/256
 Codes in 1/2**18 turn; their difference is the shorter angle, floored to U(-1,13).  The rail counter saturates.
 """
 
+from collections import namedtuple
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
@@ -50,32 +51,30 @@ def reaches(x, limit):
 
 
 @kernel
-def step(
-    state, i_a, i_b, i_c, current_at_rail, u_dc, u_dc_at_rail, code_theta, i_trip, sum_trip, rail_samples, u_dc_min,
-    u_dc_max, jump_max, fault_ignore, position_restart, position_bits,
-):  # fmt: skip
-    a, b, c = i_a >> DROP_LIMIT, i_b >> DROP_LIMIT, i_c >> DROP_LIMIT
-    over = 1 if reaches(a, i_trip) or reaches(b, i_trip) or reaches(c, i_trip) else 0
-    unbalanced = 1 if reaches(a + b + c, sum_trip) else 0
+def step(state, inputs, regs, position_bits):
+    x, r = inputs, regs
+    a, b, c = x.i_a >> DROP_LIMIT, x.i_b >> DROP_LIMIT, x.i_c >> DROP_LIMIT
+    over = 1 if reaches(a, r.i_trip) or reaches(b, r.i_trip) or reaches(c, r.i_trip) else 0
+    unbalanced = 1 if reaches(a + b + c, r.sum_trip) else 0
 
-    at_rail = current_at_rail != 0 or u_dc_at_rail != 0
+    at_rail = x.current_at_rail != 0 or x.u_dc_at_rail != 0
     railed = min(state.railed + 1, SAMPLES_HI) if at_rail else 0
-    stuck = 1 if railed > 0 and railed >= rail_samples else 0
+    stuck = 1 if railed > 0 and railed >= r.rail_samples else 0
 
-    bus = u_dc >> DROP_LIMIT
-    low = 1 if bus < u_dc_min else 0
-    high = 1 if bus >= u_dc_max else 0
+    bus = x.u_dc >> DROP_LIMIT
+    low = 1 if bus < r.u_dc_min else 0
+    high = 1 if bus >= r.u_dc_max else 0
 
-    code = code_theta << (TURN_W - position_bits)
+    code = x.code_theta << (TURN_W - position_bits)
     away = wrap_s(code - state.expected, TURN_W)
     off = away >> DROP_JUMP
-    known = state.seen == WARM and not position_restart
-    jumped = 1 if known and reaches(off, jump_max) else 0
+    known = state.seen == WARM and not r.position_restart
+    jumped = 1 if known and reaches(off, r.jump_max) else 0
     expected = wrap(2 * code - state.code, TURN_W)
-    seen = 1 if position_restart else min(state.seen + 1, WARM)
+    seen = 1 if r.position_restart else min(state.seen + 1, WARM)
 
     faults = over + 2 * unbalanced + 4 * stuck + 8 * low + 16 * high + 32 * jumped
-    return State(code, expected, seen, railed), (faults, 1 if faults & ~fault_ignore else 0)
+    return State(code, expected, seen, railed), (faults, 1 if faults & ~r.fault_ignore else 0)
 
 
 def stimuli(rng, config):
@@ -114,28 +113,34 @@ def stimuli(rng, config):
     return rows
 
 
+INPUTS = (
+    *(Port(f"i_{x}", PU, doc=f"current, phase {x}") for x in "abc"),
+    Port("current_at_rail", Format(0, 3, 0), doc="bit x: ADC code of phase x at either end"),
+    Port("u_dc", U_DC, doc="bus voltage"),
+    Port("u_dc_at_rail", BIT, doc="bus code at either end"),
+    Port("code_theta", Format(0, 0, 16), doc="position code, one mechanical turn"),
+)
+Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
+REGISTERS = (
+    Port("i_trip", LIMIT, doc="phase current that trips"),
+    Port("sum_trip", LIMIT, doc="sum of the phase currents that trips"),
+    Port("rail_samples", SAMPLES, doc="consecutive samples at the rail that trip"),
+    Port("u_dc_min", LIMIT, doc="bus voltage below which it trips"),
+    Port("u_dc_max", LIMIT, doc="bus voltage that trips"),
+    Port("jump_max", JUMP, doc="deviation from the extrapolated position that trips, turns"),
+    Port("fault_ignore", IGNORE, doc="bit x: fault x of fault_flags is reported and does not trip"),
+    Port("position_restart", BIT, doc="1: the code has nothing to do with the one of the sample before"),
+)
+Registers = namedtuple("Registers", [p.name for p in REGISTERS])
+
 BLOCK = Block(
     name="sample_checks",
     folder="io",
     paper="none: protection and diagnosis of the drive",
     step=step,
-    inputs=tuple(Port(f"i_{x}", PU, doc=f"current, phase {x}") for x in "abc")
-    + (
-        Port("current_at_rail", Format(0, 3, 0), doc="bit x: ADC code of phase x at either end"),
-        Port("u_dc", U_DC, doc="bus voltage"),
-        Port("u_dc_at_rail", BIT, doc="bus code at either end"),
-        Port("code_theta", Format(0, 0, 16), doc="position code, one mechanical turn"),
-    ),
-    registers=(
-        Port("i_trip", LIMIT, doc="phase current that trips"),
-        Port("sum_trip", LIMIT, doc="sum of the phase currents that trips"),
-        Port("rail_samples", SAMPLES, doc="consecutive samples at the rail that trip"),
-        Port("u_dc_min", LIMIT, doc="bus voltage below which it trips"),
-        Port("u_dc_max", LIMIT, doc="bus voltage that trips"),
-        Port("jump_max", JUMP, doc="deviation from the extrapolated position that trips, turns"),
-        Port("fault_ignore", IGNORE, doc="bit x: fault x of fault_flags is reported and does not trip"),
-        Port("position_restart", BIT, doc="1: the code has nothing to do with the one of the sample before"),
-    ),
+    takes=(Inputs, Registers),
+    inputs=INPUTS,
+    registers=REGISTERS,
     outputs=(
         Port("sample_faults", CHECKS, doc="faults of this sample, see sample_checks"),
         Port("sample_trip", BIT, doc="1: at least one of them trips"),

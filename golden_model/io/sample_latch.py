@@ -6,6 +6,8 @@ state) enters the core here; the blocks after it have constant inputs until the 
 Formats: unchanged; nothing is computed.
 """
 
+from collections import namedtuple
+
 from golden_model.block import Block, Port
 from golden_model.estimators import winding_resistance
 from golden_model.formats import BIT, PU
@@ -14,37 +16,8 @@ from golden_model.kernel import kernel
 
 
 @kernel
-def step(
-    adc_a,
-    adc_b,
-    adc_c,
-    adc_u_dc,
-    position_code,
-    omega_ref_in,
-    i_d_ref_in,
-    i_q_ext_in,
-    speed_mode_in,
-    temp_winding_in,
-    temp_valid_in,
-    clear_faults_in,
-    run_in,
-    *_widths,
-):
-    return (
-        adc_a,
-        adc_b,
-        adc_c,
-        adc_u_dc,
-        position_code,
-        omega_ref_in,
-        i_d_ref_in,
-        i_q_ext_in,
-        speed_mode_in,
-        temp_winding_in,
-        temp_valid_in,
-        clear_faults_in,
-        run_in,
-    )
+def step(inputs, *_widths):
+    return inputs
 
 
 NAMES = {
@@ -94,12 +67,16 @@ def bound(_v, _state):
     return dict.fromkeys(NAMES.values(), 0.0)
 
 
+INPUTS = tuple(Port(name, _PORTS[out].fmt, doc=_PORTS[out].doc) for name, out in NAMES.items())
+Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
+
 BLOCK = Block(
     name="sample_latch",
     folder="io",
     paper="001, Fig. 5: acquisition",
     step=step,
-    inputs=tuple(Port(name, _PORTS[out].fmt, doc=_PORTS[out].doc) for name, out in NAMES.items()),
+    takes=(Inputs,),
+    inputs=INPUTS,
     outputs=tuple(_PORTS[out] for out in NAMES.values()),
     latency=1,
     configs=({"ADC_BITS": 16, "POSITION_BITS": 16}, {"ADC_BITS": 12, "POSITION_BITS": 18}),

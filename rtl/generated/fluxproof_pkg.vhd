@@ -242,11 +242,18 @@ package fluxproof_pkg is
   -- register_access: clocks that a write waits for the end of a sample
   constant REGISTER_PATIENCE : positive := 73;
 
+  -- input_filter: none: pins of a board
+  constant INPUT_FILTER_LATENCY : positive := 1;
+
   -- multiply_add: the sums of products in all equations
   constant MULTIPLY_ADD_LATENCY : positive := 3;
 
-  -- sum_of_products: the rotations and cross products in all equations
-  constant SUM_OF_PRODUCTS_LATENCY : positive := 3;
+  -- packet_fifo: none: recording of samples
+  constant PACKET_FIFO_LATENCY : positive := 1;
+
+  -- reciprocal: 001, section 5.2, U_dc processing: division by 2**n / m
+  constant RECIPROCAL_LATENCY : positive := 21;
+  constant RECIPROCAL_QUOTIENT_BITS : natural := 18;
 
   -- sqrt: 001, section 5.2: voltage limit of the current regulation
   constant SQRT_LATENCY : positive := 5;
@@ -323,19 +330,306 @@ package fluxproof_pkg is
     30x"1f7efa08", 30x"1f8f3a06", 30x"1f9f6a06", 30x"1faf9a04", 30x"1fbfba04", 30x"1fcfda02", 30x"1fdfea02", 30x"1feffa01"
   );
 
-  -- reciprocal: 001, section 5.2, U_dc processing: division by 2**n / m
-  constant RECIPROCAL_LATENCY : positive := 21;
-  constant RECIPROCAL_QUOTIENT_BITS : natural := 18;
+  -- sum_of_products: the rotations and cross products in all equations
+  constant SUM_OF_PRODUCTS_LATENCY : positive := 3;
 
-  -- sample_latch: 001, Fig. 5: acquisition
-  constant SAMPLE_LATCH_LATENCY : positive := 1;
+  -- chord_speed: 001, eq. (2), for a voltage that is held during a sample
+  constant CHORD_SPEED_LATENCY : positive := 10;
+  constant CHORD_SPEED_RAISE_SQUARE : natural := 2;
+  constant CHORD_SPEED_RAISE_PART : natural := 3;
+  constant CHORD_SPEED_DROP : natural := 20;
+
+  -- current_limit: none: limit of the current, as the voltage's in paper 001, section 5.2
+  constant CURRENT_LIMIT_LATENCY : positive := 1;
+
+  -- current_pi: 001, Fig. 8 and section 5.2: PI_idq
+  constant CURRENT_PI_LATENCY : positive := 6;
+  constant CURRENT_PI_DROP_P : natural := 4;
+  constant CURRENT_PI_DROP_I : natural := 12;
+  constant CURRENT_PI_PROPORTIONAL_W : natural := 38;
+
+  -- dead_time_compensation: 000, section V.B, step d
+  constant DEAD_TIME_COMPENSATION_LATENCY : positive := 5;
+  constant DEAD_TIME_COMPENSATION_DROP : natural := 18;
+
+  -- decoupling: 001, eq. (2), 'dq decoupling term' of Fig. 8
+  constant DECOUPLING_LATENCY : positive := 2;
+  constant DECOUPLING_DROP : natural := 16;
+
+  -- speed_pi: 001, section 5.3: speed regulator with limited current reference
+  constant SPEED_PI_LATENCY : positive := 5;
+  constant SPEED_PI_DROP_P : natural := 4;
+  constant SPEED_PI_DROP_I : natural := 12;
+  constant SPEED_PI_PROPORTIONAL_W : natural := 38;
+
+  -- voltage_limit: 001, Fig. 1: decoupling at the regulators' output; limit of the space-vector modulation
+  constant VOLTAGE_LIMIT_LATENCY : positive := 10;
+
+  -- current_front: none: front end of a board
+  constant CURRENT_FRONT_LATENCY : positive := 1;
+
+  -- delta_sigma: none: front end of a board
+  constant DELTA_SIGMA_LATENCY : positive := 1;
+
+  -- modulator_input: none: front end of a board
+  constant MODULATOR_INPUT_LATENCY : positive := 1;
+  constant MODULATOR_INPUT_STROBES : natural := 16;
+
+  -- sinc3: none: front end of a board
+  constant SINC3_LATENCY : positive := 1;
+  constant SINC3_TOTAL_W : natural := 25;
+  constant SINC3_INSTANTS : natural := 3;
+  constant SINC3_PRODUCT : natural := 37;
+
+  -- sinc_overcurrent: none: front end of a board
+  constant SINC_OVERCURRENT_LATENCY : positive := 1;
+  constant SINC_OVERCURRENT_TOTAL_W : natural := 16;
+  constant SINC_OVERCURRENT_WARM : natural := 3;
+
+  -- spi_converter: none: front end of a board
+  constant SPI_CONVERTER_LATENCY : positive := 1;
+
+  -- spi_frame: none: front end of a board
+  constant SPI_FRAME_LATENCY : positive := 1;
+  constant SPI_FRAME_LEAST_RATIO : natural := 4;
+  constant SPI_FRAME_MOST_RATIO : natural := 16;
+  constant SPI_FRAME_LEAST_BITS : natural := 12;
+  constant SPI_FRAME_MOST_BITS : natural := 32;
+  constant SPI_FRAME_STROBES : natural := 16;
+  constant SPI_FRAME_TRAIL : natural := 20;
+
+  -- spi_words: none: front end of a board
+  constant SPI_WORDS_LATENCY : positive := 1;
+
+  -- third_current: none: front end of a board
+  constant THIRD_CURRENT_LATENCY : positive := 1;
+
+  -- xadc_reader: none: front end of a board
+  constant XADC_READER_LATENCY : positive := 1;
+  constant XADC_READER_CONVST_CLOCKS : natural := 8;
+
+  -- biss_master: none: BiSS interface, protocol C
+  constant BISS_MASTER_LATENCY : positive := 1;
+
+  -- edge_timer: none: speed by the time between edges
+  constant EDGE_TIMER_LATENCY : positive := 1;
+  constant EDGE_TIMER_TIME_W : natural := 24;
+  constant EDGE_TIMER_MOVED_W : natural := 16;
+  constant EDGE_TIMER_QUOTIENT_W : natural := 19;
+  constant EDGE_TIMER_UP : natural := 4;
+
+  -- endat_master: none: EnDat 2.2, bidirectional interface for position encoders
+  constant ENDAT_MASTER_LATENCY : positive := 1;
+  constant ENDAT_MASTER_FIRST : natural := 2;
+  constant ENDAT_MASTER_LET_GO : natural := 8;
+  constant ENDAT_MASTER_LISTEN : natural := 9;
+
+  -- forced_position: none: commissioning
+  constant FORCED_POSITION_LATENCY : positive := 1;
+  constant FORCED_POSITION_PLACE_W : natural := 32;
+  constant FORCED_POSITION_SHIFT : natural := 14;
+
+  -- hall_decoder: none: three Hall sensors, 120 degrees apart
+  constant HALL_DECODER_LATENCY : positive := 1;
+  type hall_decoder_middle_t is array (0 to 7) of unsigned(17 downto 0);
+  constant HALL_DECODER_MIDDLE : hall_decoder_middle_t := (  -- U(0,18)
+    18x"05555", 18x"10000", 18x"1aaab", 18x"25555", 18x"30000", 18x"3aaab", 18x"00000", 18x"00000"
+  );
+
+  -- hall_front: none: three Hall sensors, 120 degrees apart
+  constant HALL_FRONT_LATENCY : positive := 1;
+
+  -- incremental_encoder: none: incremental encoder
+  constant INCREMENTAL_ENCODER_LATENCY : positive := 1;
+
+  -- index_check: none: incremental encoder
+  constant INDEX_CHECK_LATENCY : positive := 1;
+
+  -- position_bridge: none: absolute encoders
+  constant POSITION_BRIDGE_LATENCY : positive := 1;
+  constant POSITION_BRIDGE_DROP : natural := 16;
+
+  -- position_front: none: front end of a board
+  constant POSITION_FRONT_LATENCY : positive := 1;
+
+  -- quadrature_decoder: none: incremental encoder
+  constant QUADRATURE_DECODER_LATENCY : positive := 1;
+
+  -- serial_encoder: none: absolute encoders
+  constant SERIAL_ENCODER_LATENCY : positive := 1;
+
+  -- ssi_master: none: SSI, synchronous serial interface
+  constant SSI_MASTER_LATENCY : positive := 1;
+
+  -- turn_counter: none: incremental encoder
+  constant TURN_COUNTER_LATENCY : positive := 1;
+
+  -- applied_voltage: 001, section 2.2: u_alphabeta of eq. (5)
+  constant APPLIED_VOLTAGE_LATENCY : positive := 11;
+  constant APPLIED_VOLTAGE_K_FRAC : natural := 16;
+  constant APPLIED_VOLTAGE_SCALE_W : natural := 24;
+  constant APPLIED_VOLTAGE_DROP_SCALE : natural := 10;
+  constant APPLIED_VOLTAGE_THIRD : signed(17 downto 0) := to_signed(87381, 18);  -- 0.333333333 as U(-1,18), signed for the multiplier
+  constant APPLIED_VOLTAGE_INV_SQRT3 : signed(17 downto 0) := to_signed(75674, 18);  -- 0.577350269 as U(0,17), signed for the multiplier
+  constant APPLIED_VOLTAGE_DROP_THIRD : natural := 18;
+  constant APPLIED_VOLTAGE_DROP_INV_SQRT3 : natural := 17;
+  constant APPLIED_VOLTAGE_TO_FLUX : natural := 1;
+
+  -- clean_voltage: 000, eq. (4); 001, eq. (5): the voltage without the inverter's distortion
+  constant CLEAN_VOLTAGE_LATENCY : positive := 5;
+  constant CLEAN_VOLTAGE_DROP : natural := 11;
+
+  -- current_directions: 000, eq. (6)
+  constant CURRENT_DIRECTIONS_LATENCY : positive := 23;
+  constant CURRENT_DIRECTIONS_ONE : natural := 65536;
+  constant CURRENT_DIRECTIONS_SQRT3 : signed(17 downto 0) := to_signed(113512, 18);  -- 1.732050808 as U(1,16), signed for the multiplier
+  constant CURRENT_DIRECTIONS_DROP_TURN : natural := 16;
+  constant CURRENT_DIRECTIONS_DROP_SQRT3 : natural := 16;
+  constant CURRENT_DIRECTIONS_DROP : natural := 13;
+
+  -- current_model: 001, eq. (6); with lambda_add the last term of eq. (16)
+  constant CURRENT_MODEL_LATENCY : positive := 2;
+
+  -- delta_lambda: 001, eq. (15); 'delta lambda_dq' of Fig. 8
+  constant DELTA_LAMBDA_LATENCY : positive := 12;
+  constant DELTA_LAMBDA_DROP_R : natural := 12;
+  constant DELTA_LAMBDA_DROP_SHIFTED : natural := 5;
+  constant DELTA_LAMBDA_DROP_FACTOR : natural := 17;
+  constant DELTA_LAMBDA_FADE : natural := 4;
+  constant DELTA_LAMBDA_N_MAX : natural := 12;
+
+  -- flux_compensation: 001, eq. (17): (K_p + K_i/s)*delta_lambda; the last term of eq. (16)
+  constant FLUX_COMPENSATION_LATENCY : positive := 9;
+  constant FLUX_COMPENSATION_DROP_P : natural := 3;
+  constant FLUX_COMPENSATION_DROP_I : natural := 10;
+  constant FLUX_COMPENSATION_SHIFT_LIMIT : natural := 14;
+  constant FLUX_COMPENSATION_FORGET : natural := 8;
+
+  -- flux_estimate: 001, eq. (17)
+  constant FLUX_ESTIMATE_LATENCY : positive := 1;
+
+  -- flux_merge: 001, eq. (7); 'Merge of voltage and current models' of Fig. 8
+  constant FLUX_MERGE_LATENCY : positive := 30;
+  constant FLUX_MERGE_Y_W : natural := 25;
+  constant FLUX_MERGE_X_W : natural := 34;
+  constant FLUX_MERGE_DROP_RHO : natural := 10;
+  constant FLUX_MERGE_DROP_Y : natural := 16;
+  constant FLUX_MERGE_DROP_X : natural := 7;
+  constant FLUX_MERGE_DROP_XI : natural := 8;
+  constant FLUX_MERGE_DROP_U : natural := 11;
+  constant FLUX_MERGE_X_TO_STATE : natural := 6;
+
+  -- flux_models: 001, eq. (6) and (11)
+  constant FLUX_MODELS_LATENCY : positive := 4;
+  constant FLUX_MODELS_MODEL_FLUX_W : natural := 43;
+  constant FLUX_MODELS_MERGED_FLUX_W : natural := 43;
+  constant FLUX_MODELS_SHIFT_MG : natural := 20;
+  constant FLUX_MODELS_DROP_MODEL : natural := 13;
+  constant FLUX_MODELS_DROP_MERGED : natural := 17;
+  constant FLUX_MODELS_CURRENT_MODEL : natural := 0;
+  constant FLUX_MODELS_EARLIER : natural := 2;
+  constant FLUX_MODELS_PROPOSED : natural := 3;
+
+  -- flux_monitor: none: protection and diagnosis of the drive
+  constant FLUX_MONITOR_LATENCY : positive := 1;
+
+  -- psi_adaline: 000, eq. (13), with the reluctance term of eq. (7b)
+  constant PSI_ADALINE_LATENCY : positive := 16;
+  constant PSI_ADALINE_PSI_STATE_W : natural := 36;
+  constant PSI_ADALINE_DROP_V : natural := 11;
+  constant PSI_ADALINE_DROP_R : natural := 17;
+  constant PSI_ADALINE_DROP_L : natural := 13;
+  constant PSI_ADALINE_DROP_OMEGA : natural := 16;
+  constant PSI_ADALINE_DROP_ETA : natural := 8;
+  constant PSI_ADALINE_TO_FLUX : natural := 11;
+  constant PSI_ADALINE_TO_PU : natural := 18;
+
+  -- speed_reciprocal: 001, section 5.2: lower limit of the speed for delta_lambda
+  constant SPEED_RECIPROCAL_LATENCY : positive := 24;
+  constant SPEED_RECIPROCAL_N_MAX : natural := 12;
+  constant SPEED_RECIPROCAL_DROP_WEIGHT : natural := 4;
+  constant SPEED_RECIPROCAL_DROP_FACTOR : natural := 16;
+  constant SPEED_RECIPROCAL_WEIGHT_ONE : natural := 65536;
+
+  -- torque: 001, eq. (4)
+  constant TORQUE_LATENCY : positive := 5;
+  constant TORQUE_DROP : natural := 16;
+
+  -- v_dead_adaline: 000, eq. (10) and Fig. 4(a)
+  constant V_DEAD_ADALINE_LATENCY : positive := 22;
+  constant V_DEAD_ADALINE_V_STATE_W : natural := 38;
+  constant V_DEAD_ADALINE_V_FINE_W : natural := 25;
+  constant V_DEAD_ADALINE_STEP_W : natural := 18;
+  constant V_DEAD_ADALINE_DROP_LP : natural := 8;
+  constant V_DEAD_ADALINE_DROP_FINE : natural := 13;
+  constant V_DEAD_ADALINE_DROP_MODEL : natural := 18;
+  constant V_DEAD_ADALINE_DROP_STEP : natural := 18;
+  constant V_DEAD_ADALINE_DROP_ETA : natural := 2;
+  constant V_DEAD_ADALINE_DROP_ZETA : natural := 9;
+  constant V_DEAD_ADALINE_DROP_GAMMA : natural := 2;
+  constant V_DEAD_ADALINE_TO_LEG : natural := 20;
+  constant V_DEAD_ADALINE_FINE_TO_LEG : natural := 7;
+
+  -- winding_resistance: 000, eq. (12)
+  constant WINDING_RESISTANCE_LATENCY : positive := 8;
+  constant WINDING_RESISTANCE_DROP_TCR : natural := 12;
+  constant WINDING_RESISTANCE_DROP_RHO : natural := 19;
+
+  -- board_faults: none: protection and diagnosis of the drive
+  constant BOARD_FAULTS_LATENCY : positive := 1;
+
+  -- board_snapshot: none: commissioning
+  constant BOARD_SNAPSHOT_LATENCY : positive := 1;
+
+  -- brake_chopper: none: protection of the drive
+  constant BRAKE_CHOPPER_LATENCY : positive := 1;
 
   -- current_conditioning: 001, section 5.2, I/O conditioning
   constant CURRENT_CONDITIONING_LATENCY : positive := 5;
   constant CURRENT_CONDITIONING_DROP : natural := 15;
 
+  -- fault_latch: none: protection and diagnosis of the drive
+  constant FAULT_LATCH_LATENCY : positive := 1;
+  constant FAULT_LATCH_LATE : natural := 6;
+  constant FAULT_LATCH_TRIP : natural := 7;
+  constant FAULT_LATCH_EARLY : natural := 8;
+
+  -- host_watch: none: protection of the drive
+  constant HOST_WATCH_LATENCY : positive := 1;
+
+  -- interrupts: none: interface to software
+  constant INTERRUPTS_LATENCY : positive := 1;
+
+  -- load_check: none: protection and diagnosis of the drive
+  constant LOAD_CHECK_LATENCY : positive := 3;
+
+  -- motion_checks: none: protection and diagnosis of the drive
+  constant MOTION_CHECKS_LATENCY : positive := 4;
+
+  -- offset_check: none: protection and diagnosis of the drive
+  constant OFFSET_CHECK_LATENCY : positive := 4;
+  constant OFFSET_CHECK_WINDOW_BITS : natural := 6;
+  constant OFFSET_CHECK_DROP_FINE : natural := 4;
+
   -- position: 001, section 5.2, position
   constant POSITION_LATENCY : positive := 2;
+
+  -- sample_checks: none: protection and diagnosis of the drive
+  constant SAMPLE_CHECKS_LATENCY : positive := 4;
+  constant SAMPLE_CHECKS_DROP_LIMIT : natural := 8;
+  constant SAMPLE_CHECKS_DROP_JUMP : natural := 5;
+  constant SAMPLE_CHECKS_WARM : natural := 2;
+
+  -- sample_guard: none: protection and diagnosis of the drive
+  constant SAMPLE_GUARD_LATENCY : positive := 1;
+  constant SAMPLE_GUARD_AHEAD : natural := 2;
+  constant SAMPLE_GUARD_AGE_W : natural := 20;
+
+  -- sample_join: none: front end of a board
+  constant SAMPLE_JOIN_LATENCY : positive := 1;
+
+  -- sample_latch: 001, Fig. 5: acquisition
+  constant SAMPLE_LATCH_LATENCY : positive := 1;
 
   -- speed: 001, section 5.1, speed by differentiating two consecutive samples
   constant SPEED_LATENCY : positive := 7;
@@ -343,6 +637,16 @@ package fluxproof_pkg is
   constant SPEED_TO_PU : natural := 12;
   constant SPEED_DROP_RAW : natural := 14;
   constant SPEED_DROP_STATE : natural := 4;
+
+  -- telemetry: none: recording of samples
+  constant TELEMETRY_LATENCY : positive := 1;
+  constant TELEMETRY_AGE_W : natural := 6;
+
+  -- telemetry_words: none: recording of samples
+  constant TELEMETRY_WORDS_LATENCY : positive := 2;
+  constant TELEMETRY_WORDS_COUNT : natural := 24;
+  constant TELEMETRY_WORDS_START : natural := 36;
+  constant TELEMETRY_WORDS_INDEX_W : natural := 5;
 
   -- u_dc_conditioning: 001, section 5.2, I/O conditioning
   constant U_DC_CONDITIONING_LATENCY : positive := 7;
@@ -358,12 +662,50 @@ package fluxproof_pkg is
   constant U_DC_PROCESSING_DROP_BETA : natural := 17;
   constant U_DC_PROCESSING_INVERSE_W : natural := 22;
 
+  -- gate_generation: 001, section 5.2, IGBT pulse generation
+  constant GATE_GENERATION_LATENCY : positive := 1;
+
+  -- pwm_compare: 001, section 5.2, IGBT pulse generation
+  constant PWM_COMPARE_LATENCY : positive := 7;
+  constant PWM_COMPARE_DROP : natural := 16;
+
+  -- svm: 001, section 5.2, SVM with U_dc = 2**n/m
+  constant SVM_LATENCY : positive := 5;
+  constant SVM_DROP_SCALED : natural := 16;
+  constant SVM_SCALED_W : natural := 19;
+  constant SVM_HALF : natural := 262144;
+  constant SVM_DROP_DUTY : natural := 3;
+
+  -- svm_delay_compensation: 001, section 5.2, SVM delay compensation
+  constant SVM_DELAY_COMPENSATION_LATENCY : positive := 3;
+  constant SVM_DELAY_COMPENSATION_DROP : natural := 15;
+
   -- clarke: 001, eq. (1): stator frame
   constant CLARKE_LATENCY : positive := 5;
   constant CLARKE_THIRD : signed(17 downto 0) := to_signed(87381, 18);  -- 0.333333333 as U(-1,18), signed for the multiplier
   constant CLARKE_INV_SQRT12 : signed(17 downto 0) := to_signed(75674, 18);  -- 0.288675135 as U(-1,18), signed for the multiplier
   constant CLARKE_DROP : natural := 18;
   constant CLARKE_VECTOR : natural := 90112;
+
+  -- flux_inverse_park: 001, eq. (9): T_dq/alphabeta
+  constant FLUX_INVERSE_PARK_LATENCY : positive := 6;
+
+  -- flux_park: 001, eq. (9): T_alphabeta/dq
+  constant FLUX_PARK_LATENCY : positive := 6;
+
+  -- flux_rotate: 001, eq. (9): T_dq/alphabeta
+  constant FLUX_ROTATE_LATENCY : positive := 6;
+  constant FLUX_ROTATE_DROP : natural := 16;
+
+  -- inverse_park: 001, eq. (9): T_dq/alphabeta
+  constant INVERSE_PARK_LATENCY : positive := 5;
+
+  -- park: 001, eq. (9): T_alphabeta/dq
+  constant PARK_LATENCY : positive := 5;
+
+  -- rotate: 001, eq. (9): T_dq/alphabeta
+  constant ROTATE_LATENCY : positive := 5;
+  constant ROTATE_DROP : natural := 16;
 
   -- sincos: 001, eq. (12)
   constant SINCOS_LATENCY : positive := 13;
@@ -514,347 +856,5 @@ package fluxproof_pkg is
     13x"0648", 13x"06ad", 13x"0712", 13x"0776", 13x"07db", 13x"083f", 13x"08a4", 13x"0908",
     13x"096d", 13x"09d1", 13x"0a36", 13x"0a9a", 13x"0aff", 13x"0b63", 13x"0bc8", 13x"0c2c"
   );
-
-  -- rotate: 001, eq. (9): T_dq/alphabeta
-  constant ROTATE_LATENCY : positive := 5;
-  constant ROTATE_DROP : natural := 16;
-
-  -- park: 001, eq. (9): T_alphabeta/dq
-  constant PARK_LATENCY : positive := 5;
-
-  -- current_limit: none: limit of the current, as the voltage's in paper 001, section 5.2
-  constant CURRENT_LIMIT_LATENCY : positive := 1;
-
-  -- speed_pi: 001, section 5.3: speed regulator with limited current reference
-  constant SPEED_PI_LATENCY : positive := 5;
-  constant SPEED_PI_DROP_P : natural := 4;
-  constant SPEED_PI_DROP_I : natural := 12;
-  constant SPEED_PI_PROPORTIONAL_W : natural := 38;
-
-  -- current_pi: 001, Fig. 8 and section 5.2: PI_idq
-  constant CURRENT_PI_LATENCY : positive := 6;
-  constant CURRENT_PI_DROP_P : natural := 4;
-  constant CURRENT_PI_DROP_I : natural := 12;
-  constant CURRENT_PI_PROPORTIONAL_W : natural := 38;
-
-  -- chord_speed: 001, eq. (2), for a voltage that is held during a sample
-  constant CHORD_SPEED_LATENCY : positive := 10;
-  constant CHORD_SPEED_RAISE_SQUARE : natural := 2;
-  constant CHORD_SPEED_RAISE_PART : natural := 3;
-  constant CHORD_SPEED_DROP : natural := 20;
-
-  -- decoupling: 001, eq. (2), 'dq decoupling term' of Fig. 8
-  constant DECOUPLING_LATENCY : positive := 2;
-  constant DECOUPLING_DROP : natural := 16;
-
-  -- voltage_limit: 001, Fig. 1: decoupling at the regulators' output; limit of the space-vector modulation
-  constant VOLTAGE_LIMIT_LATENCY : positive := 10;
-
-  -- svm_delay_compensation: 001, section 5.2, SVM delay compensation
-  constant SVM_DELAY_COMPENSATION_LATENCY : positive := 3;
-  constant SVM_DELAY_COMPENSATION_DROP : natural := 15;
-
-  -- inverse_park: 001, eq. (9): T_dq/alphabeta
-  constant INVERSE_PARK_LATENCY : positive := 5;
-
-  -- svm: 001, section 5.2, SVM with U_dc = 2**n/m
-  constant SVM_LATENCY : positive := 5;
-  constant SVM_DROP_SCALED : natural := 16;
-  constant SVM_SCALED_W : natural := 19;
-  constant SVM_HALF : natural := 262144;
-  constant SVM_DROP_DUTY : natural := 3;
-
-  -- pwm_compare: 001, section 5.2, IGBT pulse generation
-  constant PWM_COMPARE_LATENCY : positive := 7;
-  constant PWM_COMPARE_DROP : natural := 16;
-
-  -- gate_generation: 001, section 5.2, IGBT pulse generation
-  constant GATE_GENERATION_LATENCY : positive := 1;
-
-  -- winding_resistance: 000, eq. (12)
-  constant WINDING_RESISTANCE_LATENCY : positive := 8;
-  constant WINDING_RESISTANCE_DROP_TCR : natural := 12;
-  constant WINDING_RESISTANCE_DROP_RHO : natural := 19;
-
-  -- applied_voltage: 001, section 2.2: u_alphabeta of eq. (5)
-  constant APPLIED_VOLTAGE_LATENCY : positive := 11;
-  constant APPLIED_VOLTAGE_K_FRAC : natural := 16;
-  constant APPLIED_VOLTAGE_SCALE_W : natural := 24;
-  constant APPLIED_VOLTAGE_DROP_SCALE : natural := 10;
-  constant APPLIED_VOLTAGE_THIRD : signed(17 downto 0) := to_signed(87381, 18);  -- 0.333333333 as U(-1,18), signed for the multiplier
-  constant APPLIED_VOLTAGE_INV_SQRT3 : signed(17 downto 0) := to_signed(75674, 18);  -- 0.577350269 as U(0,17), signed for the multiplier
-  constant APPLIED_VOLTAGE_DROP_THIRD : natural := 18;
-  constant APPLIED_VOLTAGE_DROP_INV_SQRT3 : natural := 17;
-  constant APPLIED_VOLTAGE_TO_FLUX : natural := 1;
-
-  -- current_model: 001, eq. (6); with lambda_add the last term of eq. (16)
-  constant CURRENT_MODEL_LATENCY : positive := 2;
-
-  -- flux_rotate: 001, eq. (9): T_dq/alphabeta
-  constant FLUX_ROTATE_LATENCY : positive := 6;
-  constant FLUX_ROTATE_DROP : natural := 16;
-
-  -- flux_inverse_park: 001, eq. (9): T_dq/alphabeta
-  constant FLUX_INVERSE_PARK_LATENCY : positive := 6;
-
-  -- flux_merge: 001, eq. (7); 'Merge of voltage and current models' of Fig. 8
-  constant FLUX_MERGE_LATENCY : positive := 30;
-  constant FLUX_MERGE_Y_W : natural := 25;
-  constant FLUX_MERGE_X_W : natural := 34;
-  constant FLUX_MERGE_DROP_RHO : natural := 10;
-  constant FLUX_MERGE_DROP_Y : natural := 16;
-  constant FLUX_MERGE_DROP_X : natural := 7;
-  constant FLUX_MERGE_DROP_XI : natural := 8;
-  constant FLUX_MERGE_DROP_U : natural := 11;
-  constant FLUX_MERGE_X_TO_STATE : natural := 6;
-
-  -- flux_park: 001, eq. (9): T_alphabeta/dq
-  constant FLUX_PARK_LATENCY : positive := 6;
-
-  -- flux_models: 001, eq. (6) and (11)
-  constant FLUX_MODELS_LATENCY : positive := 4;
-  constant FLUX_MODELS_MODEL_FLUX_W : natural := 43;
-  constant FLUX_MODELS_MERGED_FLUX_W : natural := 43;
-  constant FLUX_MODELS_SHIFT_MG : natural := 20;
-  constant FLUX_MODELS_DROP_MODEL : natural := 13;
-  constant FLUX_MODELS_DROP_MERGED : natural := 17;
-  constant FLUX_MODELS_CURRENT_MODEL : natural := 0;
-  constant FLUX_MODELS_EARLIER : natural := 2;
-  constant FLUX_MODELS_PROPOSED : natural := 3;
-
-  -- flux_estimate: 001, eq. (17)
-  constant FLUX_ESTIMATE_LATENCY : positive := 1;
-
-  -- speed_reciprocal: 001, section 5.2: lower limit of the speed for delta_lambda
-  constant SPEED_RECIPROCAL_LATENCY : positive := 24;
-  constant SPEED_RECIPROCAL_N_MAX : natural := 12;
-  constant SPEED_RECIPROCAL_DROP_WEIGHT : natural := 4;
-  constant SPEED_RECIPROCAL_DROP_FACTOR : natural := 16;
-  constant SPEED_RECIPROCAL_WEIGHT_ONE : natural := 65536;
-
-  -- delta_lambda: 001, eq. (15); 'delta lambda_dq' of Fig. 8
-  constant DELTA_LAMBDA_LATENCY : positive := 12;
-  constant DELTA_LAMBDA_DROP_R : natural := 12;
-  constant DELTA_LAMBDA_DROP_SHIFTED : natural := 5;
-  constant DELTA_LAMBDA_DROP_FACTOR : natural := 17;
-  constant DELTA_LAMBDA_FADE : natural := 4;
-  constant DELTA_LAMBDA_N_MAX : natural := 12;
-
-  -- flux_compensation: 001, eq. (17): (K_p + K_i/s)*delta_lambda; the last term of eq. (16)
-  constant FLUX_COMPENSATION_LATENCY : positive := 9;
-  constant FLUX_COMPENSATION_DROP_P : natural := 3;
-  constant FLUX_COMPENSATION_DROP_I : natural := 10;
-  constant FLUX_COMPENSATION_SHIFT_LIMIT : natural := 14;
-  constant FLUX_COMPENSATION_FORGET : natural := 8;
-
-  -- torque: 001, eq. (4)
-  constant TORQUE_LATENCY : positive := 5;
-  constant TORQUE_DROP : natural := 16;
-
-  -- flux_monitor: none: protection and diagnosis of the drive
-  constant FLUX_MONITOR_LATENCY : positive := 1;
-
-  -- current_directions: 000, eq. (6)
-  constant CURRENT_DIRECTIONS_LATENCY : positive := 23;
-  constant CURRENT_DIRECTIONS_ONE : natural := 65536;
-  constant CURRENT_DIRECTIONS_SQRT3 : signed(17 downto 0) := to_signed(113512, 18);  -- 1.732050808 as U(1,16), signed for the multiplier
-  constant CURRENT_DIRECTIONS_DROP_TURN : natural := 16;
-  constant CURRENT_DIRECTIONS_DROP_SQRT3 : natural := 16;
-  constant CURRENT_DIRECTIONS_DROP : natural := 13;
-
-  -- dead_time_compensation: 000, section V.B, step d
-  constant DEAD_TIME_COMPENSATION_LATENCY : positive := 5;
-  constant DEAD_TIME_COMPENSATION_DROP : natural := 18;
-
-  -- clean_voltage: 000, eq. (4); 001, eq. (5): the voltage without the inverter's distortion
-  constant CLEAN_VOLTAGE_LATENCY : positive := 5;
-  constant CLEAN_VOLTAGE_DROP : natural := 11;
-
-  -- v_dead_adaline: 000, eq. (10) and Fig. 4(a)
-  constant V_DEAD_ADALINE_LATENCY : positive := 22;
-  constant V_DEAD_ADALINE_V_STATE_W : natural := 38;
-  constant V_DEAD_ADALINE_V_FINE_W : natural := 25;
-  constant V_DEAD_ADALINE_STEP_W : natural := 18;
-  constant V_DEAD_ADALINE_DROP_LP : natural := 8;
-  constant V_DEAD_ADALINE_DROP_FINE : natural := 13;
-  constant V_DEAD_ADALINE_DROP_MODEL : natural := 18;
-  constant V_DEAD_ADALINE_DROP_STEP : natural := 18;
-  constant V_DEAD_ADALINE_DROP_ETA : natural := 2;
-  constant V_DEAD_ADALINE_DROP_ZETA : natural := 9;
-  constant V_DEAD_ADALINE_DROP_GAMMA : natural := 2;
-  constant V_DEAD_ADALINE_TO_LEG : natural := 20;
-  constant V_DEAD_ADALINE_FINE_TO_LEG : natural := 7;
-
-  -- psi_adaline: 000, eq. (13), with the reluctance term of eq. (7b)
-  constant PSI_ADALINE_LATENCY : positive := 16;
-  constant PSI_ADALINE_PSI_STATE_W : natural := 36;
-  constant PSI_ADALINE_DROP_V : natural := 11;
-  constant PSI_ADALINE_DROP_R : natural := 17;
-  constant PSI_ADALINE_DROP_L : natural := 13;
-  constant PSI_ADALINE_DROP_OMEGA : natural := 16;
-  constant PSI_ADALINE_DROP_ETA : natural := 8;
-  constant PSI_ADALINE_TO_FLUX : natural := 11;
-  constant PSI_ADALINE_TO_PU : natural := 18;
-
-  -- packet_fifo: none: recording of samples
-  constant PACKET_FIFO_LATENCY : positive := 1;
-
-  -- telemetry_words: none: recording of samples
-  constant TELEMETRY_WORDS_LATENCY : positive := 2;
-  constant TELEMETRY_WORDS_COUNT : natural := 24;
-  constant TELEMETRY_WORDS_START : natural := 36;
-  constant TELEMETRY_WORDS_INDEX_W : natural := 5;
-
-  -- telemetry: none: recording of samples
-  constant TELEMETRY_LATENCY : positive := 1;
-  constant TELEMETRY_AGE_W : natural := 6;
-
-  -- sample_guard: none: protection and diagnosis of the drive
-  constant SAMPLE_GUARD_LATENCY : positive := 1;
-  constant SAMPLE_GUARD_AHEAD : natural := 2;
-  constant SAMPLE_GUARD_AGE_W : natural := 20;
-
-  -- sample_checks: none: protection and diagnosis of the drive
-  constant SAMPLE_CHECKS_LATENCY : positive := 4;
-  constant SAMPLE_CHECKS_DROP_LIMIT : natural := 8;
-  constant SAMPLE_CHECKS_DROP_JUMP : natural := 5;
-  constant SAMPLE_CHECKS_WARM : natural := 2;
-
-  -- motion_checks: none: protection and diagnosis of the drive
-  constant MOTION_CHECKS_LATENCY : positive := 4;
-
-  -- load_check: none: protection and diagnosis of the drive
-  constant LOAD_CHECK_LATENCY : positive := 3;
-
-  -- offset_check: none: protection and diagnosis of the drive
-  constant OFFSET_CHECK_LATENCY : positive := 4;
-  constant OFFSET_CHECK_WINDOW_BITS : natural := 6;
-  constant OFFSET_CHECK_DROP_FINE : natural := 4;
-
-  -- brake_chopper: none: protection of the drive
-  constant BRAKE_CHOPPER_LATENCY : positive := 1;
-
-  -- host_watch: none: protection of the drive
-  constant HOST_WATCH_LATENCY : positive := 1;
-
-  -- fault_latch: none: protection and diagnosis of the drive
-  constant FAULT_LATCH_LATENCY : positive := 1;
-  constant FAULT_LATCH_LATE : natural := 6;
-  constant FAULT_LATCH_TRIP : natural := 7;
-  constant FAULT_LATCH_EARLY : natural := 8;
-
-  -- interrupts: none: interface to software
-  constant INTERRUPTS_LATENCY : positive := 1;
-
-  -- spi_frame: none: front end of a board
-  constant SPI_FRAME_LATENCY : positive := 1;
-  constant SPI_FRAME_LEAST_RATIO : natural := 4;
-  constant SPI_FRAME_MOST_RATIO : natural := 16;
-  constant SPI_FRAME_LEAST_BITS : natural := 12;
-  constant SPI_FRAME_MOST_BITS : natural := 32;
-  constant SPI_FRAME_STROBES : natural := 16;
-  constant SPI_FRAME_TRAIL : natural := 20;
-
-  -- spi_words: none: front end of a board
-  constant SPI_WORDS_LATENCY : positive := 1;
-
-  -- spi_converter: none: front end of a board
-  constant SPI_CONVERTER_LATENCY : positive := 1;
-
-  -- modulator_input: none: front end of a board
-  constant MODULATOR_INPUT_LATENCY : positive := 1;
-  constant MODULATOR_INPUT_STROBES : natural := 16;
-
-  -- sinc3: none: front end of a board
-  constant SINC3_LATENCY : positive := 1;
-  constant SINC3_TOTAL_W : natural := 25;
-  constant SINC3_INSTANTS : natural := 3;
-  constant SINC3_PRODUCT : natural := 37;
-
-  -- sinc_overcurrent: none: front end of a board
-  constant SINC_OVERCURRENT_LATENCY : positive := 1;
-  constant SINC_OVERCURRENT_TOTAL_W : natural := 16;
-  constant SINC_OVERCURRENT_WARM : natural := 3;
-
-  -- third_current: none: front end of a board
-  constant THIRD_CURRENT_LATENCY : positive := 1;
-
-  -- xadc_reader: none: front end of a board
-  constant XADC_READER_LATENCY : positive := 1;
-  constant XADC_READER_CONVST_CLOCKS : natural := 8;
-
-  -- input_filter: none: pins of a board
-  constant INPUT_FILTER_LATENCY : positive := 1;
-
-  -- quadrature_decoder: none: incremental encoder
-  constant QUADRATURE_DECODER_LATENCY : positive := 1;
-
-  -- turn_counter: none: incremental encoder
-  constant TURN_COUNTER_LATENCY : positive := 1;
-
-  -- index_check: none: incremental encoder
-  constant INDEX_CHECK_LATENCY : positive := 1;
-
-  -- edge_timer: none: speed by the time between edges
-  constant EDGE_TIMER_LATENCY : positive := 1;
-  constant EDGE_TIMER_TIME_W : natural := 24;
-  constant EDGE_TIMER_MOVED_W : natural := 16;
-  constant EDGE_TIMER_QUOTIENT_W : natural := 19;
-  constant EDGE_TIMER_UP : natural := 4;
-
-  -- hall_decoder: none: three Hall sensors, 120 degrees apart
-  constant HALL_DECODER_LATENCY : positive := 1;
-  type hall_decoder_middle_t is array (0 to 7) of unsigned(17 downto 0);
-  constant HALL_DECODER_MIDDLE : hall_decoder_middle_t := (  -- U(0,18)
-    18x"05555", 18x"10000", 18x"1aaab", 18x"25555", 18x"30000", 18x"3aaab", 18x"00000", 18x"00000"
-  );
-
-  -- incremental_encoder: none: incremental encoder
-  constant INCREMENTAL_ENCODER_LATENCY : positive := 1;
-
-  -- ssi_master: none: SSI, synchronous serial interface
-  constant SSI_MASTER_LATENCY : positive := 1;
-
-  -- biss_master: none: BiSS interface, protocol C
-  constant BISS_MASTER_LATENCY : positive := 1;
-
-  -- endat_master: none: EnDat 2.2, bidirectional interface for position encoders
-  constant ENDAT_MASTER_LATENCY : positive := 1;
-  constant ENDAT_MASTER_FIRST : natural := 2;
-  constant ENDAT_MASTER_LET_GO : natural := 8;
-  constant ENDAT_MASTER_LISTEN : natural := 9;
-
-  -- position_bridge: none: absolute encoders
-  constant POSITION_BRIDGE_LATENCY : positive := 1;
-  constant POSITION_BRIDGE_DROP : natural := 16;
-
-  -- serial_encoder: none: absolute encoders
-  constant SERIAL_ENCODER_LATENCY : positive := 1;
-
-  -- hall_front: none: three Hall sensors, 120 degrees apart
-  constant HALL_FRONT_LATENCY : positive := 1;
-
-  -- position_front: none: front end of a board
-  constant POSITION_FRONT_LATENCY : positive := 1;
-
-  -- delta_sigma: none: front end of a board
-  constant DELTA_SIGMA_LATENCY : positive := 1;
-
-  -- current_front: none: front end of a board
-  constant CURRENT_FRONT_LATENCY : positive := 1;
-
-  -- forced_position: none: commissioning
-  constant FORCED_POSITION_LATENCY : positive := 1;
-  constant FORCED_POSITION_PLACE_W : natural := 32;
-  constant FORCED_POSITION_SHIFT : natural := 14;
-
-  -- sample_join: none: front end of a board
-  constant SAMPLE_JOIN_LATENCY : positive := 1;
-
-  -- board_faults: none: protection and diagnosis of the drive
-  constant BOARD_FAULTS_LATENCY : positive := 1;
-
-  -- board_snapshot: none: commissioning
-  constant BOARD_SNAPSHOT_LATENCY : positive := 1;
 
 end package fluxproof_pkg;

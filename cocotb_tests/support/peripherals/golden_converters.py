@@ -11,26 +11,23 @@ from golden_model.kernel import kernel
 
 @kernel
 def spi(state, trigger, miso, busy, r, adc_bits, lines):
-    """``r``: the registers in the order of the declaration; one row of outputs for each clock."""
+    """``r``: spi_converter.Registers; one row of outputs for each clock."""
     out = np.empty((trigger.size, 14), np.int64)
     for n in range(trigger.size):
-        state, y = spi_converter.step(
-            state, trigger[n], miso[n], busy[n], r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8], r[9], r[10],
-            adc_bits, lines,
-        )  # fmt: skip
+        inputs = spi_converter.Inputs(sample_trigger=trigger[n], miso=miso[n], busy=busy[n])
+        state, y = spi_converter.step(state, inputs, r, adc_bits, lines)
         out[n, :] = np.array(y)
     return out
 
 
 @kernel
 def xadc(state, inputs, r, adc_bits):
-    """``inputs``: columns in the order of the declaration; one row of outputs for each clock."""
+    """``inputs``: columns in the order of the declaration; ``r``: xadc_reader.Registers; one row of outputs a clock."""
     out = np.empty((len(inputs), 9), np.int64)
     for n in range(len(inputs)):
-        state, y = xadc_reader.step(
-            state, inputs[n, 0], inputs[n, 1], inputs[n, 2], inputs[n, 3], inputs[n, 4],
-            r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7], adc_bits,
-        )  # fmt: skip
+        x = inputs[n]
+        now = xadc_reader.Inputs(sample_trigger=x[0], busy=x[1], eoc=x[2], drdy=x[3], drp_do=x[4])
+        state, y = xadc_reader.step(state, now, r, adc_bits)
         out[n, :] = np.array(y)
     return out
 

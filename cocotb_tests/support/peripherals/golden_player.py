@@ -19,8 +19,12 @@ PIECE = 1 << 18  # clocks at a time, for the memory
 def _loop(name: str):
     """loop(state, rows, seen, config values): the block's step with the columns of a row as its arguments."""
     block = BLOCKS[name]
-    count = len(block.inputs + block.registers)
-    arguments = ", ".join(f"row[{k}]" for k in range(count))
+    columns = [f"row[{k}]" for k in range(len(block.inputs + block.registers))]
+    arguments = ", ".join(columns)
+    if block.takes:
+        rest = iter(columns)
+        records = [", ".join(next(rest) for _ in record._fields) for record in block.takes]
+        arguments = ", ".join(f"takes_{k}({values})" for k, values in enumerate(records))
     generics = ", ".join(f"config[{k}]" for k in range(len(block.configs[0])))
     shown = "\n        ".join(f"seen[k, {j}] = out[{j}]" for j in range(len(block.outputs)))
     text = f"""
@@ -31,7 +35,7 @@ def loop(state, rows, seen, config):
         {shown}
     return state
 """
-    space = {"step": block.step}
+    space = {"step": block.step} | {f"takes_{k}": record for k, record in enumerate(block.takes)}
     exec(text, space)
     return numba.njit(space["loop"])
 

@@ -91,6 +91,9 @@ class _Listener:
     def __init__(self, module, notes):
         self._module, self._notes = module, notes
 
+    def __getattr__(self, name):
+        return getattr(self._module, name)
+
     def step(self, *args):
         result = self._module.step(*args)
         self._notes[self._module].append(result[1] if self._module.BLOCK.state is not None else result)
