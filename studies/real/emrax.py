@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from fluxproof.checkout import ROOT
-from fluxproof.diagnosis.answer.estimates import named_effects
-from fluxproof.diagnosis.answer.headline import sentence
-from fluxproof.diagnosis.answer.names import names_of
+from fluxproof.diagnosis.decide.estimates import named_effects
+from fluxproof.diagnosis.decide.names import names_of
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.physics import explain
+from fluxproof.diagnosis.words.headline import sentence
 from studies.real.outputs import write
 from studies.real.splits import axis_misfit, bounds, estimates_of, flux_map_of, on_other_rows
 

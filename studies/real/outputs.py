@@ -6,12 +6,12 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from fluxproof.diagnosis.answer.advice import complete
-from fluxproof.diagnosis.answer.improve import write_improved
 from fluxproof.diagnosis.ground.recording import RecordingError
+from fluxproof.diagnosis.improve.improve import write_improved
 from fluxproof.diagnosis.overlay.compare import closed_loop
 from fluxproof.diagnosis.physics import known_effects
 from fluxproof.diagnosis.report.write import json_ready, write_outputs
+from fluxproof.diagnosis.words.advice import complete
 from golden_model.drive_keys import DriveError
 
 NAMES_OF_AXES = {

@@ -6,10 +6,10 @@ from __future__ import annotations
 import contextlib
 from pathlib import Path
 
-from fluxproof.diagnosis.answer.conclude import conclude, judge
 from fluxproof.diagnosis.balance.cells import voltage_rms
 from fluxproof.diagnosis.balance.parts import sound
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.decide.conclude import conclude, judge
 from fluxproof.diagnosis.ground import constants
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import RecordingError

@@ -12,9 +12,9 @@ from cocotb_tests.support.recordings.from_core import POINT, recorded
 from cocotb_tests.support.recordings.with_mistake import MISTAKES, PHASES, ROOT2, Mistake, scaled, table_of, written
 from cocotb_tests.support.slow import halved
 from fluxproof.diagnosis import diagnose
-from fluxproof.diagnosis.answer.improve import write_improved
 from fluxproof.diagnosis.conventions.table import readings_for
 from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.improve.improve import write_improved
 from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.session import run
 

@@ -10,16 +10,16 @@ from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.recordings.with_effect import NOMINAL, T, healthy, usual, with_effect
 from cocotb_tests.support.slow import halved
 from fluxproof.diagnosis import diagnose
-from fluxproof.diagnosis.answer.improve import write_improved
-from fluxproof.diagnosis.answer.locate import at_order, harmonic
-from fluxproof.diagnosis.answer.sizes import Sizes
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.cells import cells_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.command import answer_lines
+from fluxproof.diagnosis.decide.locate import at_order, harmonic
+from fluxproof.diagnosis.decide.sizes import Sizes
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.plant_section import in_addition, read_flux_map
 from fluxproof.diagnosis.ground.recording import from_columns
+from fluxproof.diagnosis.improve.improve import write_improved
 from fluxproof.diagnosis.session import run
 
 MOST_LEFT = 0.05  # of the power of the misfit above its noise floor
