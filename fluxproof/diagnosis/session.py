@@ -27,6 +27,7 @@ from fluxproof.diagnosis.balance.parts import left_out
 from fluxproof.diagnosis.build import Beside, build
 from fluxproof.diagnosis.checks import check_recording
 from fluxproof.diagnosis.conventions.apply import read_drive, read_recording
+from fluxproof.diagnosis.decide.decision import Decision
 from fluxproof.diagnosis.decide.rules import not_compared
 from fluxproof.diagnosis.fleet.prior import among, load_prior
 from fluxproof.diagnosis.ground.nominal import Nominal, load_nominal
@@ -56,6 +57,11 @@ class Worked:
     explained: Explained
     beside: Beside
     nominal: Nominal
+
+    @property
+    def decision(self) -> Decision:
+        """What was decided, and what it was decided from."""
+        return self.explained.decision
 
     def answer(self, *after: str) -> Diagnosis:
         """The diagnosis; after: notes on the written files."""
@@ -93,7 +99,7 @@ def run(recordings, drive, out, progress=lambda text: None, prior=None) -> Diagn
 
 def _write(worked: Worked, recording, stage, out, progress) -> Diagnosis:
     """All files of the answer into ``stage``, from where they enter ``out``."""
-    nominal, decision, notes, laid_over = worked.nominal, worked.explained.decision, [], None
+    nominal, decision, notes, laid_over = worked.nominal, worked.decision, [], None
     improved = _improved(nominal, decision, stage, recording, notes.append)
     if write_flux_map(decision, stage):
         notes.append(FLUX_MAP_NOTE)

@@ -53,7 +53,7 @@ def work(item: Item) -> Result:
         with local(item.recording) as path:
             folder = path.parent
             worked = diagnosed(path, nominal)
-            row = row_of(worked.answer(), worked.explained.decision.posterior)
+            row = row_of(worked.answer(), worked.decision.posterior)
     except (RecordingError, DriveError) as error:
         row, lasting = failed_row(str(error)), _unchanged(item)  # a file may have been removed or replaced meanwhile
     except (OSError, MemoryError) as error:  # of this machine, not of the recording
