@@ -52,7 +52,8 @@ def conclude_one_point(view) -> Decision:
     off = abs(constant) > resolution(view)
     point = OnePoint(constant, off, tuple(explaining(view, cells, effects, drifting, constant)), long)
     drift = _fit(cells, centred.y, best.residual, sigma, held) if long else _spread(raw - constant * off, sigma)
-    names, groups, beside, kind, fit = _ruled(_sorted_out(best, tied, effects, view), best, drift, point, view)
+    found = _sorted_out(best, tied, effects, view)
+    names, groups, beside, kind, fit = _ruled(found, best, drift, point, view)
     wider = fuller(fitter, best, effects, drifting, view) + with_copper(fitter, best, cells, view)
     return Decision(
         kind,
@@ -75,7 +76,8 @@ def _ruled(found, best, drift: Fit, point: OnePoint, view):
     """
     known = point.off and len(point.candidates) > 1  # by what one of them explains
     left_over = best.chi2 > k.LEFTOVER * max(best.rows - best.count, 1) and drift.share_left > k.FLOOR_SHARE
-    names, groups, unclear = _unless_unclear(*found, left_over, drift)
+    unclear = _is_unclear(found[0], left_over, drift)
+    names, groups = ((), ()) if unclear else found
     if known and not unclear:
         groups = (*groups, point.candidates)
     quiet = not unclear and not point.off and drift.train_before < max(2.0 * drift.noise_floor, resolution(view))
@@ -87,10 +89,9 @@ def _ruled(found, best, drift: Fit, point: OnePoint, view):
     return names, groups, beside, kind, fit
 
 
-def _unless_unclear(names, groups, left_over, drift: Fit):
-    """(names, groups, whether they are dropped): where most of a drift is left, it may imitate what was found."""
-    unclear = bool(names) and left_over and drift.explained_share < k.NAMED_SHARE
-    return ((), (), True) if unclear else (names, groups, False)
+def _is_unclear(names, left_over, drift: Fit) -> bool:
+    """Whether nothing of a drift is named: where much of it is left, the rest may imitate what was found."""
+    return bool(names) and left_over and drift.explained_share < k.NAMED_SHARE
 
 
 def _beside_constant(names, groups, unknown, fit: Fit):

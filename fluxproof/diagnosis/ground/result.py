@@ -238,9 +238,9 @@ class Diagnosis:
 
     def to_json(self) -> dict:
         """The mapping written to diagnosis.json (schema 2)."""
-        plain = _listed(dataclasses.asdict(dataclasses.replace(self, evidence=Evidence())))
+        plain = dataclasses.asdict(dataclasses.replace(self, evidence=Evidence()))
+        plain = {key: _listed(value) for key, value in plain.items() if key != "evidence"}
         rows, problems = plain.pop("rows"), plain.pop("problems")
-        plain.pop("evidence")
         return {"schema": 2, **plain, "recording": {"rows": rows, "problems": problems}}
 
 

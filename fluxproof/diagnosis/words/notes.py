@@ -3,7 +3,16 @@
 
 from __future__ import annotations
 
-from fluxproof.diagnosis.decide.decision import CONSTANT, HELD_OUT, IMITATION, INSIGNIFICANT, NOISE, Decision, Withheld
+from fluxproof.diagnosis.decide.decision import (
+    CONSTANT,
+    HELD_OUT,
+    IMITATION,
+    INSIGNIFICANT,
+    NOISE,
+    Basis,
+    Decision,
+    Withheld,
+)
 from fluxproof.diagnosis.words.balance_notes import balance_notes
 from fluxproof.diagnosis.words.one_point_notes import one_point_notes
 from fluxproof.diagnosis.words.phrases import as_if, capital, percent_below, title_of
@@ -11,12 +20,13 @@ from fluxproof.diagnosis.words.phrases import as_if, capital, percent_below, tit
 
 def notes_of(decision: Decision, effects) -> list[str]:
     """The notes on a decision; effects: the catalogue with the causes beyond it."""
-    if decision.basis is None:
+    basis = decision.basis
+    if basis is None:
         return []
     withheld = lambda *why: [_withheld(w, effects) for w in decision.withheld if w.why in why]  # noqa: E731
     return [
         *withheld(IMITATION),
-        *_of_balance(decision, effects),
+        *_of_balance(decision, basis),
         *(f"The residual also looks {as_if(term)}." for term in decision.alike),
         *withheld(CONSTANT, HELD_OUT),
         *withheld(NOISE, INSIGNIFICANT),
@@ -36,11 +46,12 @@ def _withheld(w: Withheld, effects) -> str:
     return f"{capital(title_of(w.effect, effects))}: {why[w.why]}"
 
 
-def _of_balance(decision: Decision, effects) -> list[str]:
+def _of_balance(decision: Decision, basis: Basis) -> list[str]:
     """What the balance used and cannot show, and what the model of a named effect leaves out at these points."""
-    basis = decision.basis
     if basis.one_point is not None:
         return one_point_notes(basis.view, basis.one_point, basis.held)
+    if basis.posterior is None:
+        return []
     best, effects = basis.posterior.best(), basis.posterior.setup.effects
     caveats = (effects[e.name].caveat(basis.view, best.c[e.name]) for e in decision.effects)
     return [*balance_notes(basis.view, basis.held, effects, decision.ambiguity), *filter(None, caveats)]
