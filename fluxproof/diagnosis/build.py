@@ -63,10 +63,11 @@ def worded(facts: Diagnosis, nominal: Nominal, after: tuple[str, ...] = ()) -> D
     nominal: the drive as it was read; after: notes that stand last.
     """
     effects = known_effects()
+    sentence = facts.sentence or headline(facts, effects)
     return replace(
         facts,
-        sentence=facts.sentence or headline(facts, effects),
-        details=details(facts, effects),
+        sentence=sentence,
+        details=details(facts, sentence, effects),
         advice=advice(facts, nominal, effects),
         notes=(*facts.notes, *doubts(facts, nominal, effects), *after),
     )

@@ -71,7 +71,7 @@ def samples():
 def test_headline_is_short_and_has_no_raw_keys(answer):
     text = headline(answer, KNOWN)
     assert 20 < len(text) <= MOST_LETTERS and text.endswith(".") and text.isascii(), text
-    words = set(re.findall(r"\w+", text + details(answer, KNOWN)))
+    words = set(re.findall(r"\w+", text + details(answer, text, KNOWN)))
     assert not words & KEYS and "u_dq" not in words and not re.search(r"\de[-+]\d", text), text
 
 
@@ -85,7 +85,7 @@ def test_much_that_is_left_beside_an_explanation_is_told():
     explained = made_up()["explained"]
     for left, told in ((0.2, False), (0.5, True)):
         fit = Fit(holdout_before=9.0, holdout_after=left, noise_floor=0.1)
-        assert ("5 times the noise floor" in details(replace(explained, fit=fit), KNOWN)) == told
+        assert ("5 times the noise floor" in details(replace(explained, fit=fit), "", KNOWN)) == told
 
 
 def test_a_headline_says_what_and_how_large():
@@ -159,6 +159,14 @@ def test_an_effect_outside_the_catalogue_is_called_by_its_meaning():
 
 def test_every_parameter_has_a_title():
     assert all(p.title for e in KNOWN.values() if e.named for p in e.parameters)
+
+
+def test_details_do_not_repeat_the_headline():
+    dead = NamedEffect("dead_time", 0.99, {"v_dead_v": Estimate(5.0873, 0.23, "V")}, 0.9)
+    answer = worded(replace(made_up()["explained"], sentence="", effects=(dead,)), NOMINAL)
+    assert "dead-time voltage" in answer.sentence and "dead-time voltage" not in answer.details
+    short = worded(replace(answer, sentence="Dead time."), NOMINAL)
+    assert "dead-time voltage" in short.details
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)

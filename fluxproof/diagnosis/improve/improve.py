@@ -3,8 +3,8 @@
 
 The file keeps the text of the original; a changed line states the old value and the effect.  Values for which the
 core's own sections have a key go there, so that ``fluxproof registers`` computes the improved registers; the others go
-to [plant.*], which only the plant reads (improved_plant.py).  A sensor error appears in [plant.sensors] as a property
-of the hardware, and in [sensors] as the trim that cancels it.
+to [plant.*], which only the plant reads (ground/plant_section.py).  A sensor error appears in [plant.sensors] as a
+property of the hardware, and in [sensors] as the trim that cancels it.
 """
 
 from __future__ import annotations

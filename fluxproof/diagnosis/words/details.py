@@ -9,13 +9,13 @@ from fluxproof.diagnosis.words.phrases import CORRECTED, as_if, capital, part_te
 MUCH_LEFT = 3.0  # times the noise floor: a larger residual is reported although the misfit is explained
 
 
-def details(answer, effects) -> str:
-    """The figures behind the headline: every parameter, and the misfit at points that were not fitted."""
+def details(answer, sentence, effects) -> str:
+    """The figures behind the headline: every parameter that is not in ``sentence``, the misfit at held-out points."""
     fit, parts = answer.fit, []
     if answer.verdict in ("bad_recording", "digital_mismatch"):
         return ""
     full = f"{capital('; '.join(said(e, effects) for e in answer.effects))}."
-    if answer.effects and full != answer.sentence:
+    if answer.effects and full != sentence:
         parts.append(full)
     volts = lambda x: ascii_of(quantity(x, fit.unit, 3))  # noqa: E731
     if fit.holdout_before > 0.0:
