@@ -21,10 +21,10 @@ from fluxproof.command import main
 from fluxproof.commission import command as commissioning
 from fluxproof.commission import steps
 from fluxproof.commission.session import Step, Value
-from fluxproof.diagnosis.answer.improve import write_improved
 from fluxproof.diagnosis.conventions.reading import Reading
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import from_columns
+from fluxproof.diagnosis.improve.improve import write_improved
 from fluxproof.diagnosis.ingest.units import split_unit
 from fluxproof.diagnosis.report import pictures, write_outputs
 from fluxproof.project import parts

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import tomlkit
 
-from fluxproof.diagnosis.answer.improved_core import core_values
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.plant_section import errors_beyond, plant_of
+from fluxproof.diagnosis.improve.improved_core import core_values
 from fluxproof.print_registers import bases_lines, c_lines, table
 from fluxproof.project import parts, render
 from fluxproof.simulate import verdict

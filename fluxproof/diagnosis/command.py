@@ -126,9 +126,9 @@ class Progress:
 
 def answer_lines(answer, nominal, out: Path) -> list[str]:
     """Headline, advice, effects, ambiguities, next recordings, misfit, findings and the files, as lines of text."""
-    from fluxproof.diagnosis.answer.doubts import IMPLAUSIBLE
     from fluxproof.diagnosis.ground.quantities import measured
     from fluxproof.diagnosis.ground.result import FILES
+    from fluxproof.diagnosis.words.doubts import IMPLAUSIBLE
 
     lines = [answer.sentence, *([answer.advice] if answer.advice else [])]
     if answer.effects:
@@ -183,7 +183,7 @@ def _among(p) -> str:
 
 def _request(nominal):
     """A function that formats a Request as a line, with the shaft speed in rpm."""
-    from fluxproof.diagnosis.answer.advice import point_text
+    from fluxproof.diagnosis.words.advice import point_text
 
     return lambda request: f"  {point_text(request, nominal)}: {request.why}"
 

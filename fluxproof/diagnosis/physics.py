@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The physical part of a diagnosis: from loaded recordings to effects, ambiguities and the unexplained residual."""
+"""The physical part of a diagnosis: from loaded recordings to a decision and the next recording."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from fluxproof.diagnosis.answer.conclude import conclude
-from fluxproof.diagnosis.answer.headline import sentence
 from fluxproof.diagnosis.balance.blocks import views_of
 from fluxproof.diagnosis.balance.cells import voltage_rms
 from fluxproof.diagnosis.balance.holdout import held_out, holdout_blocks
@@ -14,38 +14,51 @@ from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.balance.parts import sound
 from fluxproof.diagnosis.balance.slow_view import SlowView, slow_view
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.decide.conclude import conclude
+from fluxproof.diagnosis.decide.decision import Decision
+from fluxproof.diagnosis.decide.interpretation import restated, under
+from fluxproof.diagnosis.decide.one_point import conclude_one_point
+from fluxproof.diagnosis.decide.rules import not_compared
 from fluxproof.diagnosis.ground.nominal import Nominal
-from fluxproof.diagnosis.ground.recording import Recording
-from fluxproof.diagnosis.ground.result import Diagnosis
+from fluxproof.diagnosis.ground.recording import Problem, Recording
 from fluxproof.diagnosis.inference.linearise import Rows
 from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.interpret.judge import preferred
-from fluxproof.diagnosis.interpret.tell import under
 from fluxproof.diagnosis.loading.restated import as_read
-from fluxproof.diagnosis.one_point import diagnose_one_point
+from fluxproof.diagnosis.plan.next_recording import next_recording
+from fluxproof.diagnosis.plan.planned import Planned
 from fluxproof.diagnosis.suspects import SUSPECTS
 
 
-def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: None, shifts=None) -> Diagnosis:
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """The decision on recordings of one drive, the points to record next, rows and findings of the recordings used."""
+
+    decision: Decision
+    planned: tuple[Planned, ...]
+    rows: int
+    problems: tuple[Problem, ...]
+
+
+def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: None, shifts=None) -> Explained:
     """Explain one recording, or several of the same drive, against a nominal drive.
 
     shifts: {effect: change of its log prior odds}.
     Raises RecordingError if the recordings contain no operating point for which a voltage balance can be made.
     """
-    nominal = as_read(loaded, nominal)
-    loaded = sound(loaded, nominal, CATALOGUE)
-    problems = [p for r in loaded for p in r.problems]
-    rows = sum(len(r) for r in loaded)
-    if any(r.fatal for r in loaded):
-        worst = next(p for p in problems if p.fatal)
-        why = f"The recording cannot be used: {worst.located()}"
-        return Diagnosis("bad_recording", why, rows=rows, problems=problems)
-    answer = _physics(loaded, nominal, progress, shifts)
-    answer.rows, answer.problems = rows, problems
-    if answer.verdict == "no_mismatch":  # it agrees as the checks read it, which the headline must say
-        answer.sentence = sentence(answer, known_effects())
-    return answer
+    nominal, changed = as_read(loaded, nominal), loaded[0].meta.get("restated")
+    used = sound(loaded, nominal, CATALOGUE)
+    if any(r.fatal for r in used):
+        return explained(not_compared("bad_recording"), used)
+    decision = restated(_decision(used, nominal, progress, shifts), changed)
+    return explained(decision, used, next_recording(decision, progress))
+
+
+def explained(decision: Decision, used: list[Recording], planned=(), more: tuple[Problem, ...] = ()) -> Explained:
+    """A decision on the recordings that were used; more: findings beside those of the checks."""
+    problems = (*(p for r in used for p in r.problems), *more)
+    return Explained(decision, planned, sum(len(r) for r in used), problems)
 
 
 def known_effects() -> dict:
@@ -67,7 +80,7 @@ def view_and_held(recordings, nominal):
 
 
 def single_point(view) -> bool:
-    """Whether a view has one operating point, of which only the drift is evidence (one_point.py)."""
+    """Whether a view has one operating point, of which only the drift is evidence (decide/one_point.py)."""
     return isinstance(view, SlowView) and np.ptp(view.run) == 0
 
 
@@ -83,15 +96,15 @@ def _posterior(view, held, progress, shifts) -> Posterior:
     return Posterior(setup, progress)
 
 
-def _physics(recordings, nominal, progress, shifts) -> Diagnosis:
+def _decision(recordings, nominal, progress, shifts) -> Decision:
     view, held = view_and_held(recordings, nominal)
     if single_point(view):
-        return diagnose_one_point(view)
+        return conclude_one_point(view)
     posterior = _posterior(view, held, progress, shifts)
-    answer = conclude(posterior, held, progress)
-    if answer.verdict == "no_mismatch":
-        return answer
-    readings, rivals, read = preferred(recordings, posterior, answer.verdict != "unexplained", progress)
+    decision = conclude(posterior, held)
+    if decision.verdict == "no_mismatch":
+        return decision
+    readings, rivals, read = preferred(recordings, posterior, decision.verdict != "unexplained", progress)
     if not readings:
-        return answer
-    return under(readings, rivals, answer, conclude(read, held, progress), voltage_rms(view))
+        return decision
+    return under(readings, rivals, decision, conclude(read, held), voltage_rms(view))

@@ -18,39 +18,54 @@ All files enter OUT together at the end (fluxproof/stage.py).
 from __future__ import annotations
 
 import os
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from fluxproof.diagnosis.answer.advice import complete
-from fluxproof.diagnosis.answer.flux_found import NAME as FLUX_MAP
-from fluxproof.diagnosis.answer.flux_found import write_flux_map
-from fluxproof.diagnosis.answer.improve import write_improved
 from fluxproof.diagnosis.balance.parts import left_out
+from fluxproof.diagnosis.build import Beside, build
 from fluxproof.diagnosis.checks import check_recording
 from fluxproof.diagnosis.conventions.apply import read_drive, read_recording
+from fluxproof.diagnosis.decide.decision import Decision
+from fluxproof.diagnosis.decide.rules import not_compared
 from fluxproof.diagnosis.fleet.prior import among, load_prior
 from fluxproof.diagnosis.ground.nominal import Nominal, load_nominal
 from fluxproof.diagnosis.ground.recording import Problem, Recording, RecordingError
 from fluxproof.diagnosis.ground.result import FILES, Diagnosis, Digital
-from fluxproof.diagnosis.inference.posterior import Posterior
-from fluxproof.diagnosis.interpret.tell import restate
+from fluxproof.diagnosis.improve.flux_found import NAME as FLUX_MAP
+from fluxproof.diagnosis.improve.flux_found import write_flux_map
+from fluxproof.diagnosis.improve.improve import write_improved
 from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.overlay.compare import closed_loop
-from fluxproof.diagnosis.physics import explain, known_effects
+from fluxproof.diagnosis.physics import Explained, explain, explained
 from fluxproof.diagnosis.replay.digital import replay
 from fluxproof.diagnosis.report import write_outputs
+from fluxproof.diagnosis.words.further_notes import FLUX_MAP as FLUX_MAP_NOTE
+from fluxproof.diagnosis.words.further_notes import loop_notes, not_improved, not_simulated, prior_note
 from fluxproof.files import refuse_overwriting
 from fluxproof.stage import together
 from golden_model.drive_keys import DriveError
 
 IMPROVED, ANSWER = "drive_improved.toml", "diagnosis.json"
-FLUX_MAP_NOTE = (
-    "flux_map.csv contains the flux linkage over the recorded currents; "
-    'use it by [plant.machine] flux_map = "flux_map.csv".'
-)
-OVERLAY_SIGNALS = ("u_d_ref", "u_q_ref")  # not the currents: the controller regulates them to their references
+
+
+@dataclass(frozen=True, eq=False)
+class Worked:
+    """A diagnosis before its sentences: what the physics and the session found, and the drive it was found against."""
+
+    explained: Explained
+    beside: Beside
+    nominal: Nominal
+
+    @property
+    def decision(self) -> Decision:
+        """What was decided, and what it was decided from."""
+        return self.explained.decision
+
+    def answer(self, *after: str) -> Diagnosis:
+        """The diagnosis; after: notes on the written files."""
+        return build(self.explained, self.nominal, replace(self.beside, after=after))
 
 
 def diagnose(recordings, drive, progress=lambda text: None, prior=None) -> Diagnosis:
@@ -61,9 +76,14 @@ def diagnose(recordings, drive, progress=lambda text: None, prior=None) -> Diagn
     If the recordings contain the core's outputs, the core is replayed first.
     Raises RecordingError and DriveError for unusable input.
     """
+    return work(recordings, drive, progress, prior).answer()
+
+
+def work(recordings, drive, progress=lambda text: None, prior=None) -> Worked:
+    """``diagnose`` with what the answer was decided from."""
     nominal = drive if isinstance(drive, Nominal) else load_nominal(drive)
     with threadpool_limits(1):  # many small matrices: more threads only wait
-        return _diagnose(_loaded(recordings, nominal, progress), nominal, progress, prior)
+        return _worked(_loaded(recordings, nominal, progress), nominal, progress, prior)
 
 
 def run(recordings, drive, out, progress=lambda text: None, prior=None) -> Diagnosis:
@@ -73,23 +93,25 @@ def run(recordings, drive, out, progress=lambda text: None, prior=None) -> Diagn
         _keep_inputs(Path(out), nominal, [*_listed(recordings), prior])
         loaded = _loaded(recordings, nominal, progress)
         with together(out, FILES) as stage:
-            answer = _diagnose(loaded, nominal, progress, prior)
-            _write(answer, loaded[0], nominal, stage, Path(out), progress)
-    return answer
+            worked = _worked(loaded, nominal, progress, prior)
+            return _write(worked, loaded[0], stage, Path(out), progress)
 
 
-def _write(answer, recording, nominal, stage, out, progress) -> None:
+def _write(worked: Worked, recording, stage, out, progress) -> Diagnosis:
     """All files of the answer into ``stage``, from where they enter ``out``."""
-    improved = _improved(nominal, answer, stage, recording)
-    if write_flux_map(answer, stage):
-        answer.notes.append(FLUX_MAP_NOTE)
-    laid_over = None
-    if answer.verdict not in ("bad_recording", "digital_mismatch"):
+    nominal, decision, notes, laid_over = worked.nominal, worked.decision, [], None
+    improved = _improved(nominal, decision, stage, recording, notes.append)
+    if write_flux_map(decision, stage):
+        notes.append(FLUX_MAP_NOTE)
+    if decision.basis is not None:
         progress("the closed loop over the recording")
-        read = read_recording(recording, answer.readings), read_drive(nominal, answer.readings)
-        laid_over = _overlay(*read, improved and (improved, out / IMPROVED), answer)
+        read = read_recording(recording, decision.readings), read_drive(nominal, decision.readings)
+        laid_over, said = _overlay(*read, improved and (improved, out / IMPROVED))
+        notes += said
     progress("writing the report")
+    answer = worked.answer(*notes)
     write_outputs(answer, stage, nominal, laid_over)
+    return answer
 
 
 def _listed(recordings) -> list:
@@ -127,24 +149,19 @@ def _checked(recording: Recording, nominal: Nominal) -> Recording:
     return copy
 
 
-def _diagnose(loaded, nominal, progress, fleet=None) -> Diagnosis:
+def _worked(loaded, nominal, progress, fleet=None) -> Worked:
     """The digital part, then the physics if the controller's outputs equal those of its golden model."""
     prior = load_prior(fleet, nominal.path) if fleet is not None else None
     digital, notes = _digital(loaded, progress)
     if digital.first_difference is not None:
-        answer = Diagnosis("digital_mismatch", _mismatch_sentence(digital.first_difference))
-        answer.rows = sum(len(recording) for recording in loaded)
-        answer.problems = [p for recording in loaded for p in recording.problems]
+        found = explained(not_compared("digital_mismatch"), loaded)
     else:
-        answer = _physics(loaded, nominal, progress, prior.shifts() if prior else None)
-        restate(answer, loaded)
-    answer.digital = digital
+        found = _physics(loaded, nominal, progress, prior.shifts() if prior else None)
+    placed = None
     if prior is not None:
-        answer.prior = among(prior, answer)
-        notes.append(_prior_note(answer))
-    answer.notes = [*notes, *answer.notes, *_reading_notes(loaded)]
-    complete(answer, read_drive(nominal, answer.readings), known_effects())
-    return answer
+        placed = among(prior, found.decision.posterior)
+        notes.append(prior_note(placed, found.decision))
+    return Worked(found, Beside(digital, placed, tuple(notes), _reading_notes(loaded)), nominal)
 
 
 def _keep_inputs(out: Path, nominal: Nominal, read: list) -> None:
@@ -161,29 +178,15 @@ def _keep_inputs(out: Path, nominal: Nominal, read: list) -> None:
         raise DriveError(f"{chart}: no diagnosis wrote this, and it would be overwritten; choose another folder")
 
 
-def _prior_note(answer) -> str:
-    """That a fleet was the prior, and what it did."""
-    fleet = answer.prior
-    used = isinstance(answer.search, Posterior)
-    if used:
-        did = "it changed the prior odds of the effects, to even odds at most, so the fleet alone is no evidence"
-    elif answer.verdict in ("bad_recording", "digital_mismatch"):
-        did = "it was not used, as the physics was not diagnosed"
-    else:
-        did = "it was not used, as one operating point is judged without a prior"
-    return f"The population of {fleet.drives} drives in {fleet.path} was the prior: {did}."
-
-
-def _physics(loaded, nominal, progress, shifts) -> Diagnosis:
-    """The verdict of physics.py; a recording without a usable operating point is a bad recording."""
+def _physics(loaded, nominal, progress, shifts) -> Explained:
+    """The decision of physics.py; a recording without a usable operating point is a bad recording."""
     try:
         return explain(loaded, nominal, progress, shifts)
     except RecordingError as error:
         problem = Problem("no_balance", str(error), fatal=True)
-        problems = [p for recording in loaded for p in recording.problems]
-        rows = sum(len(recording) for recording in loaded)
-        sentence = f"The recording cannot be used: {error}"
-        return Diagnosis("bad_recording", sentence, rows=rows, problems=[*problems, problem])
+        # The reason of a part that was left out is a finding of another one (balance/parts.py).
+        used = [recording for recording in loaded if not recording.fatal]
+        return explained(not_compared("bad_recording"), used, more=(problem,))
 
 
 def _digital(loaded, progress) -> tuple[Digital, list[str]]:
@@ -198,9 +201,8 @@ def _digital(loaded, progress) -> tuple[Digital, list[str]]:
         notes += [f"{name}{sentence}" for sentence in said]
         digital = Digital(digital.checked or found.checked, digital.samples + found.samples)
         if found.first_difference is not None:
-            digital.first_difference = flat(found.first_difference)
-            if len(loaded) > 1:
-                digital.first_difference["recording"] = recording.source
+            where = {"recording": recording.source} if len(loaded) > 1 else {}
+            digital = replace(digital, first_difference=flat(found.first_difference) | where)
             break
     if digital.checked and digital.first_difference is None:
         notes.append("The controller equals its golden model in every bit, so any difference is physical.")
@@ -222,29 +224,19 @@ def flat(difference: dict) -> dict:
     return out
 
 
-def _mismatch_sentence(d: dict) -> str:
-    """Sentence with block, sample, signal and bit of the first difference, and its cause if one was found."""
-    text = (
-        f"The controller's output differs from its golden model: block {d['block']}, sample {d['sample']}, "
-        f"signal {d['signal']}, bit {d['bit']} (recorded {d['recorded']}, golden model {d['golden']})"
-    )
-    return f"{text}; {d['cause']}." if d.get("cause") else f"{text}."
-
-
-def _reading_notes(loaded) -> list[str]:
+def _reading_notes(loaded) -> tuple[str, ...]:
     """The notes of the readers without duplicates."""
-    notes = [note for recording in loaded for note in recording.meta.get("notes", [])]
-    return list(dict.fromkeys(notes))
+    return tuple(dict.fromkeys(note for recording in loaded for note in recording.meta.get("notes", [])))
 
 
-def _improved(nominal, answer, stage, recording) -> Path | None:
-    """Write the improved drive if anything was found."""
-    if not answer.effects and not answer.readings:
+def _improved(nominal, decision, stage, recording, note) -> Path | None:
+    """Write the improved drive if anything was found; note: called with why it was not written."""
+    if not decision.effects and not decision.readings:
         return None
     try:
-        return write_improved(nominal, answer.effects, stage / IMPROVED, answer.readings, recording)
+        return write_improved(nominal, decision.effects, stage / IMPROVED, decision.readings, recording)
     except (DriveError, ValueError) as error:
-        answer.notes.append(f"No {IMPROVED}: {error}.")
+        note(not_improved(IMPROVED, error))
         return None
 
 
@@ -256,22 +248,13 @@ def _named(file: Path, name: Path) -> Nominal:
         raise DriveError(str(error).replace(str(file), str(name))) from None
 
 
-def _overlay(recording, nominal, improved, answer) -> dict | None:
-    """The closed-loop simulation of the first recording; a drive that cannot be simulated only adds a note.
+def _overlay(recording, nominal, improved) -> tuple[dict | None, list[str]]:
+    """(closed-loop simulation of the first recording, notes); a drive that cannot be simulated only adds a note.
 
     improved: (the improved drive's file, its name when all is written), or None.
     """
     try:
         laid_over = closed_loop(recording, nominal, _named(*improved) if improved else None)
     except (ArithmeticError, IndexError, KeyError, TypeError, ValueError) as error:  # RecordingError, DriveError too
-        answer.notes.append(f"The closed loop was not simulated: {error}.")
-        return None
-    for signal in OVERLAY_SIGNALS:
-        before = laid_over["rms_before"].get(signal)
-        after = laid_over.get("rms_after", {}).get(signal)
-        if before is not None:
-            then = f" and by {after:.3g} V with the improved drive" if after is not None else ""
-            answer.notes.append(
-                f"In closed-loop simulation, {signal} differs by {before:.3g} V rms with the nominal drive{then}."
-            )
-    return laid_over
+        return None, [not_simulated(error)]
+    return laid_over, loop_notes(laid_over)

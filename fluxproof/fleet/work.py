@@ -14,7 +14,7 @@ from fluxproof.diagnosis.fleet.prior import design_of
 from fluxproof.diagnosis.fleet.row import failed_row, one_line, row_of
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import RecordingError
-from fluxproof.diagnosis.session import diagnose
+from fluxproof.diagnosis.session import work as diagnosed
 from fluxproof.fleet.addresses import MOST_BYTES, blocks, local, opened, remote, stated
 from golden_model.drive_keys import DriveError
 
@@ -52,7 +52,8 @@ def work(item: Item) -> Result:
         nominal = load_nominal(item.drive)
         with local(item.recording) as path:
             folder = path.parent
-            row = row_of(diagnose(path, nominal))
+            worked = diagnosed(path, nominal)
+            row = row_of(worked.answer(), worked.decision.posterior)
     except (RecordingError, DriveError) as error:
         row, lasting = failed_row(str(error)), _unchanged(item)  # a file may have been removed or replaced meanwhile
     except (OSError, MemoryError) as error:  # of this machine, not of the recording

@@ -8,6 +8,7 @@ plane of the map for the surface.  The result is compared with held-out dwells o
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.ground.nominal import load_nominal
-from fluxproof.diagnosis.ground.result import Estimate, Fit, NamedEffect
+from fluxproof.diagnosis.ground.result import Diagnosis, Estimate, Fit, NamedEffect
 from fluxproof.files import write_text
 from fluxproof.plant import FluxMap
 from studies.real.brusa_loop import Course, measured_map, record, serpentine
@@ -60,7 +61,7 @@ def run(folder: Path, out: Path, progress=lambda text: None) -> dict:
     asserted = {e.name for e in answer.effects} | {n for group in answer.ambiguity for n in group}
     beside = earned(everything, sorted(asserted - {"saturation", "cross_saturation"}), train=train)
     before = answer.sentence
-    _tell(answer, surface, names(steps, noise_v), beside, view, held, noise_v)
+    answer = _with_surface(answer, surface, names(steps, noise_v), beside, view, held, noise_v)
     errors = {"covered grid of the measured map": compare(surface, truth)}
     result = write(
         "brusa_flux_map",
@@ -142,8 +143,8 @@ def cannot_tell(surface: Surface, truth: FluxMap) -> list[str]:
     ]
 
 
-def _tell(answer, surface, found, beside, view, held, noise_v) -> None:
-    """Add the surface to the answer: the names that follow from it, the map as plant parameter, the residual."""
+def _with_surface(answer, surface, found, beside, view, held, noise_v) -> Diagnosis:
+    """The answer with the surface: the names that follow from it, the map as plant parameter, the residual."""
     chart, covered = surface.flux_map(MAP_STEP_A)
     edge = np.abs(surface.points.imag).max()
     on_axis = surface.psi(np.array([0.0, 1j * edge, -1j * edge]))
@@ -161,26 +162,36 @@ def _tell(answer, surface, found, beside, view, held, noise_v) -> None:
         },
     }
     kept = [e for e in answer.effects if beside.get(e.name, 0.0) >= EARNS and e.name not in own]
-    answer.effects = [
+    effects = tuple(
         NamedEffect(n, 0.999, own[n], float(share), {"machine.flux_map": chart.mended()} if n == found[0] else {})
         for n in found
-    ] + kept
-    answer.ambiguity = [g for g in answer.ambiguity if sum(beside.get(n, EARNS) >= EARNS for n in g) > 1]
+    )
+    ambiguity = tuple(g for g in answer.ambiguity if sum(beside.get(n, EARNS) >= EARNS for n in g) > 1)
     y, left = misfit(view)["u"].mean(axis=1), surface.residual(view)
     rms = lambda x: float(np.sqrt(np.mean(np.abs(x) ** 2)))  # noqa: E731
-    answer.fit = Fit("u_dq", "V", rms(y[~held]), rms(left[~held]), rms(y[held]), rms(left[held]), noise_v)
-    answer.verdict = "ambiguous" if answer.ambiguity else "explained" if found else answer.verdict
-    answer.unknown_term, answer.next_recording = None, answer.next_recording if answer.ambiguity else []
-    if answer.evidence.arrays:
-        answer.evidence.arrays |= {"after_d": left.real, "after_q": left.imag}
+    fit = Fit("u_dq", "V", rms(y[~held]), rms(left[~held]), rms(y[held]), rms(left[held]), noise_v)
+    arrays = answer.evidence.arrays
     what = " and ".join(NAMES_OF_AXES[n] for n in found)
-    answer.sentence = (
+    sentence = (
         f"{what[0].upper()}{what[1:]}: with the flux map found, the misfit at held-out operating points falls from "
-        f"{answer.fit.holdout_before:.3g} V to {answer.fit.holdout_after:.3g} V."
+        f"{fit.holdout_before:.3g} V to {fit.holdout_after:.3g} V."
     )
-    answer.explained_share, answer.remainder = answer.fit.explained_share, []
-    answer.advice = ""  # that of the answer with the map is written with its outputs
-    answer.notes.append(
+    note = (
         f"The flux map is a free reciprocal surface over {int(covered.sum())} of {covered.size} points of its grid; "
         f"its estimated error is {1e3 * sigma:.2g} mWb rms."
+    )
+    return replace(
+        answer,
+        verdict="ambiguous" if ambiguity else "explained" if found else answer.verdict,
+        sentence=sentence,
+        effects=(*effects, *kept),
+        ambiguity=ambiguity,
+        next_recording=answer.next_recording if ambiguity else (),
+        fit=fit,
+        explained_share=fit.explained_share,
+        remainder=(),
+        unknown_term=None,
+        advice="",  # that of the answer with the map is written with its outputs
+        notes=(*answer.notes, note),
+        evidence=replace(answer.evidence, arrays=arrays and arrays | {"after_d": left.real, "after_q": left.imag}),
     )

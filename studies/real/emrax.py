@@ -8,14 +8,15 @@ load machine and only one direction.  If several explanations remain, all of the
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from fluxproof.checkout import ROOT
-from fluxproof.diagnosis.answer.estimates import named_effects
-from fluxproof.diagnosis.answer.headline import sentence
-from fluxproof.diagnosis.answer.names import names_of
+from fluxproof.diagnosis.build import Beside, build
+from fluxproof.diagnosis.decide.estimates import named_effects
+from fluxproof.diagnosis.decide.names import names_of
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.loading.load import load_recording
@@ -34,10 +35,11 @@ def run(folder: Path, out: Path, progress=lambda text: None) -> dict:
     """Diagnose, verify on other points and on a later part, write the outputs; returns the entry of result.json."""
     started, nominal = time.perf_counter(), load_nominal(DRIVE)
     recording = load_recording(folder / FILE, nominal)
-    answer = explain([recording], nominal, progress)
+    found = explain([recording], nominal, progress)
+    decision = found.decision
     diagnosed = time.perf_counter()
     progress("other splits")
-    posterior, held = answer.search, answer.held
+    posterior, held = decision.posterior, decision.basis.held
     best, setup = posterior.best(), posterior.setup
     view, effects = setup.view, setup.effects
     loaded = np.abs(view.i_raw[:, 0]) > LOADED * nominal.machine.rated_current_a
@@ -52,13 +54,11 @@ def run(folder: Path, out: Path, progress=lambda text: None) -> dict:
         "unloaded_from_loaded": at_rest,
     }
     parts = [estimates_of(alone_fit), estimates_of(later_fit)]
-    for effect in answer.effects:
-        _widen(effect, parts)
-    answer.sentence = sentence(answer, effects)
-    answer.notes.append("Standard deviations include the differences between separately fitted parts of the log.")
+    widened = replace(decision, effects=tuple(_widened(effect, parts) for effect in decision.effects))
+    note = "Standard deviations include the differences between separately fitted parts of the log."
+    answer = build(replace(found, decision=widened), nominal, Beside(after=(note,)))
     model = _with_map(named_effects(names_of(posterior), posterior, {}, only=best.names), flux_map_of(best))
-    for effect in model:
-        _widen(effect, parts)
+    model = [_widened(effect, parts) for effect in model]
     if_added = bounds(posterior)
     entry = write(
         "emrax228",
@@ -86,19 +86,19 @@ def _with_map(effects, flux_map):
     """The model's effects with one flux map instead of formulas that the plant lacks; the first one contains it."""
     if flux_map is None:
         return effects
-    first = True
-    for effect in effects:
-        if effect.name in FLUXES:
-            effect.plant = {"machine.flux_map": flux_map} if first else {}
-            first = False
-    return effects
+    carrier = next((effect.name for effect in effects if effect.name in FLUXES), None)
+    plants = {name: {"machine.flux_map": flux_map} if name == carrier else {} for name in FLUXES}
+    return [replace(effect, plant=plants.get(effect.name, effect.plant)) for effect in effects]
 
 
-def _widen(effect, parts) -> None:
-    """Increase the standard deviations to the differences between parts of the log, since formula errors repeat."""
+def _widened(effect, parts):
+    """The effect with sigmas that hold the differences between parts of the log, since formula errors repeat."""
+    parameters = {}
     for name, estimate in effect.parameters.items():
         others = [part[name][0] for part in parts if name in part]
-        estimate.sigma = float(max([estimate.sigma, *(abs(x - estimate.value) for x in others)]))
+        sigma = float(max([estimate.sigma, *(abs(x - estimate.value) for x in others)]))
+        parameters[name] = replace(estimate, sigma=sigma)
+    return replace(effect, parameters=parameters)
 
 
 def _cannot_tell(view, nominal, best, if_added, alone, at_rest) -> list[str]:

@@ -9,12 +9,13 @@ the friction of one that does.
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from fluxproof.diagnosis.ground.nominal import load_nominal
-from fluxproof.diagnosis.ground.result import Diagnosis, Estimate, Evidence, Fit, NamedEffect
+from fluxproof.diagnosis.ground.result import Diagnosis, Estimate, Evidence, Fit, Location, NamedEffect
 from fluxproof.diagnosis.loading.load import load_recording
 from studies.real import q_axis
 from studies.real.laas_words import cannot_tell
@@ -53,7 +54,7 @@ def run(folder: Path, out: Path, progress=lambda text: None) -> dict:
     before, after = _misfit(log, nominal, hold, line)
     answer = _answer(nominal, log, hold, side, cogging, line, torque, before, after)
     recording = load_recording(folder / FILE, nominal)
-    answer.rows, answer.problems = len(recording), recording.problems
+    answer = replace(answer, rows=len(recording), problems=tuple(recording.problems))
     p = nominal.machine.pole_pairs
     more = {
         "held_out": {"q": {k: _rms(x[_last(x)]) for k, x in (("before", before), ("after", after))}},
@@ -132,26 +133,30 @@ def _answer(nominal, log, hold, side, cogging, line, torque, before, after) -> D
         "friction": ({"coulomb_nm": coulomb, "viscous_nms": viscous}, shaft),
         "cogging": (waves, cogs),
     }
-    effects = [NamedEffect(name, 0.999, values, 0.0, plant) for name, (values, plant) in found.items()]
     part = _last(before)
     rest = slice(0, part.start)
     floor = _rms(log.u_q - log.smooth(log.u_q))
     fit = Fit("u_q", "V", _rms(before[rest]), _rms(after[rest]), _rms(before[part]), _rms(after[part]), floor)
-    answer = Diagnosis("explained", "", effects=effects, fit=fit)
-    share = 1.0 - (fit.holdout_after / fit.holdout_before) ** 2
-    effects[0].explains = effects[1].explains = float(np.clip(share, 0.0, 1.0))
-    answer.location.signal = "u_q"
-    answer.sentence = (
+    share = float(np.clip(1.0 - (fit.holdout_after / fit.holdout_before) ** 2, 0.0, 1.0))
+    shares = dict.fromkeys(list(found)[:2], share)  # those that act on the voltage
+    sentence = (
         f"On the q axis, the only one recorded: resistance {resistance.value:.3g} ohm, magnet flux "
         f"{1e3 * psi.value:.3g} mWb, friction and cogging of order {order}; the misfit of held-out rows falls from "
         f"{1e3 * fit.holdout_before:.3g} mV to {1e3 * fit.holdout_after:.3g} mV."
     )
-    answer.notes = [
+    notes = (
         "Torques are 1.5 k_e i_q, which assumes peak values and an amplitude-invariant transformation.",
         "The nominal resistance is an assumed value; its difference from the measured one is no finding.",
-    ]
-    answer.evidence = _evidence(log, p, before, after)
-    return answer
+    )
+    return Diagnosis(
+        "explained",
+        sentence,
+        effects=tuple(NamedEffect(n, 0.999, v, shares.get(n, 0.0), plant) for n, (v, plant) in found.items()),
+        location=Location("u_q"),
+        fit=fit,
+        notes=notes,
+        evidence=_evidence(log, p, before, after),
+    )
 
 
 def _evidence(log, p, before, after) -> Evidence:

@@ -6,11 +6,10 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from fluxproof.diagnosis.answer.advice import complete
-from fluxproof.diagnosis.answer.improve import write_improved
+from fluxproof.diagnosis.build import worded
 from fluxproof.diagnosis.ground.recording import RecordingError
+from fluxproof.diagnosis.improve.improve import write_improved
 from fluxproof.diagnosis.overlay.compare import closed_loop
-from fluxproof.diagnosis.physics import known_effects
 from fluxproof.diagnosis.report.write import json_ready, write_outputs
 from golden_model.drive_keys import DriveError
 
@@ -34,7 +33,7 @@ def write(name: str, answer, nominal, recording, out: Path, more: dict, model=No
     except (RecordingError, DriveError, ValueError) as error:
         why = str(error).replace(recording.source, Path(recording.source).name)
     if not answer.advice:
-        complete(answer, nominal, known_effects())
+        answer = worded(answer, nominal)
     write_outputs(answer, folder, nominal, overlay)
     entry = {
         "verdict": answer.verdict,

@@ -6,17 +6,18 @@ from __future__ import annotations
 import contextlib
 from pathlib import Path
 
-from fluxproof.diagnosis.answer.conclude import conclude, judge
 from fluxproof.diagnosis.balance.cells import voltage_rms
 from fluxproof.diagnosis.balance.parts import sound
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.decide.conclude import conclude
+from fluxproof.diagnosis.decide.interpretation import under
+from fluxproof.diagnosis.decide.rules import judge
 from fluxproof.diagnosis.ground import constants
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.interpret.judge import preferred
-from fluxproof.diagnosis.interpret.tell import under
 from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.loading.restated import as_read
 from fluxproof.diagnosis.physics import explain, rows_of, single_point, view_and_held
@@ -41,7 +42,7 @@ def said(verdict, effects, ambiguity) -> dict:
 
 def said_in_full(loaded, nominal) -> dict:
     """What the whole diagnosis says."""
-    answer = explain(loaded, nominal)
+    answer = explain(loaded, nominal).decision
     return said(answer.verdict, [e.name for e in answer.effects], answer.ambiguity)
 
 
@@ -77,7 +78,7 @@ class Case:
         steps = self.steps
         posterior = steps(Posterior, steps(Setup.of, self.rows, steps))
         j = steps(judge, posterior, self.held)
-        plain = said(j.kind, j.names.confidence, j.names.open)
+        plain = said(j.kind, j.names.named, j.names.ambiguous)
         if j.kind == "no_mismatch":
             return plain
         found = steps(preferred, self.recordings, posterior, j.kind != "unexplained")

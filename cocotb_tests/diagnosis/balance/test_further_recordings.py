@@ -8,13 +8,13 @@ import pytest
 
 from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.recordings.from_core import GRID, columns, recorded
-from fluxproof.diagnosis.answer.request import wants_cold
 from fluxproof.diagnosis.balance.blocks import view_of, views_of
 from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import from_columns
 from fluxproof.diagnosis.physics import held_out
+from fluxproof.diagnosis.plan.request import wants_cold
 
 NOMINAL = load_nominal(PAPER)
 COLD = NOMINAL.machine.temperature_ref_c

@@ -21,6 +21,7 @@ from fluxproof.diagnosis.fleet.row import row_of
 from fluxproof.diagnosis.fleet.schema import schema
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.report.write import json_ready
+from fluxproof.diagnosis.session import work
 from studies.blind.generate import write_recording
 from studies.fleet import drives
 
@@ -38,14 +39,14 @@ def drive(tmp_path_factory):
     exact.build.change("motor", **dict.fromkeys(("r_a", "r_b", "r_c"), m["resistance_ohm"]))
     exact.build.change("motor", l_d=m["inductance_d_h"], l_q=m["inductance_q_h"], psi_m=m["magnet_flux_wb"])
     path = write_recording(folder / "exact", drives.record(exact, small_fleet.SEED, 0), "parquet")
-    return folder, path, diagnose(path, folder / "drive.toml")
+    return folder, path, work(path, folder / "drive.toml")
 
 
-def population_of(folder, answer, change, name) -> str:
+def population_of(folder, alone, change, name) -> str:
     """A fleet.parquet of 30 drives, each the row of an answer after ``change(row, n)``."""
     rows = []
     for n in range(30):
-        row = copy.deepcopy(row_of(answer))
+        row = copy.deepcopy(row_of(alone.answer(), alone.decision.posterior))
         change(row, n)
         head = dict(recording=f"r{n:02d}", drive="drive.toml", serial=f"S{n:02d}", status="done", key=f"{n}", more=[])
         rows.append({**row, **head, "design": design_of(folder / "drive.toml"), "version": "1"})
@@ -67,7 +68,7 @@ def faulty(row, n):
 
 def test_a_fleet_of_faulty_drives_makes_no_faulty_one_of_a_healthy_drive(drive):
     folder, path, alone = drive
-    assert alone.verdict == "no_mismatch" and not alone.effects
+    assert alone.decision.verdict == "no_mismatch" and not alone.decision.effects
     fleet = population_of(folder, alone, faulty, "faulty.parquet")
     prior = load_prior(fleet, folder / "drive.toml")
     assert all(prior.rates[e] > 0.9 for e in (*FAULTY, "resistance"))  # the fleet is as one-sided as can be

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.drives import PAPER, PLAIN
-from fluxproof.diagnosis.answer.improve import plant_of, write_improved
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.plant_keys import KEYS
 from fluxproof.diagnosis.ground.result import NamedEffect
+from fluxproof.diagnosis.improve.improve import plant_of, write_improved
 from fluxproof.plant import flux_from_currents, machine_params
 from golden_model import drive as drives
 from golden_model.drive_keys import DriveError

@@ -6,8 +6,8 @@ import pytest
 
 from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.recordings.from_core import recorded
-from fluxproof.diagnosis.answer.scan import stray_swing
 from fluxproof.diagnosis.balance.blocks import view_of
+from fluxproof.diagnosis.decide.off_orders import stray_swing
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.inference.evidence import evidence
 from fluxproof.diagnosis.inference.model import BalanceRows, Columns, Prior

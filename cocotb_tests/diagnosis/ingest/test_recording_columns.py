@@ -10,10 +10,10 @@ import pytest
 import tomlkit
 
 from cocotb_tests.support.recordings.from_equations import codes, dq_made, made, nominal_of, write
-from fluxproof.diagnosis.answer.improve import _set
 from fluxproof.diagnosis.conventions.apply import edit
 from fluxproof.diagnosis.conventions.table import READINGS
 from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
+from fluxproof.diagnosis.improve.improve import _set
 from fluxproof.diagnosis.ingest.units import OF_BUS
 from fluxproof.diagnosis.ingest.usual_names import NAMES, TOLD_BY_UNIT, usual
 from fluxproof.diagnosis.loading.load import load_recording

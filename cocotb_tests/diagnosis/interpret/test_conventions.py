@@ -12,11 +12,11 @@ from cocotb_tests.support.recordings.from_core import POINT, recorded
 from cocotb_tests.support.recordings.with_mistake import MISTAKES, PHASES, ROOT2, Mistake, scaled, table_of, written
 from cocotb_tests.support.slow import halved
 from fluxproof.diagnosis import diagnose
-from fluxproof.diagnosis.answer.improve import write_improved
 from fluxproof.diagnosis.conventions.table import readings_for
 from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.improve.improve import write_improved
 from fluxproof.diagnosis.loading.load import load_recording
-from fluxproof.diagnosis.session import run
+from fluxproof.diagnosis.session import run, work
 
 GIVEN_BACK = (  # whose improved drive file is tried as well
     "currents in rms", "dq voltages line to line", "angle of the q axis", "bus at half", "R, L and psi line to line",
@@ -43,7 +43,8 @@ def test_there_are_enough_mistakes():
 def test_a_mistake_is_told_and_nothing_else(name, tmp_path):
     mistake = MISTAKES[name]
     recording, drive = written(mistake, tmp_path)
-    answer = diagnose(recording, drive)
+    worked = work(recording, drive)
+    answer = worked.answer()
     assert not answer.effects and not answer.ambiguity, answer.sentence
     codes = {r.code for r in readings_for(load_nominal(tmp_path / "drive.toml"))} | {"pole_pairs", "sample_time_s"}
     if set(mistake.found.split()) <= codes:
@@ -58,7 +59,9 @@ def test_a_mistake_is_told_and_nothing_else(name, tmp_path):
         assert answer.conventions and "drive_improved.toml" in answer.advice
         nominal, path = load_nominal(drive), tmp_path / "drive_improved.toml"
         recorded_there = load_recording(recording, nominal)
-        again = diagnose(recording, write_improved(nominal, answer.effects, path, answer.readings, recorded_there))
+        again = diagnose(
+            recording, write_improved(nominal, answer.effects, path, worked.decision.readings, recorded_there)
+        )
         assert again.verdict == "no_mismatch" and not again.conventions, again.sentence
 
 

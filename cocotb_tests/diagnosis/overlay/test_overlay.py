@@ -11,10 +11,10 @@ import pytest
 from cocotb_tests.support.drives import PAPER
 from fluxproof.cosim.closed_loop import described_sensors
 from fluxproof.cosim.scenarios import RPM, scenario, steps
-from fluxproof.diagnosis.answer.improve import plant_of, write_improved
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import RecordingError, from_columns
 from fluxproof.diagnosis.ground.result import NamedEffect
+from fluxproof.diagnosis.improve.improve import plant_of, write_improved
 from fluxproof.diagnosis.overlay.compare import closed_loop
 from fluxproof.diagnosis.overlay.inputs import dq_currents
 from fluxproof.diagnosis.replay.capture import capture

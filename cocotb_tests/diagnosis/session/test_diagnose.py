@@ -62,7 +62,7 @@ def test_a_healthy_drive_has_no_mismatch():
     answer = diagnose(recorded(), NOMINAL)
     assert answer.verdict == "no_mismatch" and not answer.effects and not answer.ambiguity, summary(answer)
     assert answer.fit.holdout_before < 0.2, summary(answer)
-    assert answer.rows == len(GRID) * 800 and answer.problems == []
+    assert answer.rows == len(GRID) * 800 and answer.problems == ()
 
 
 @pytest.mark.parametrize("name", CASES)

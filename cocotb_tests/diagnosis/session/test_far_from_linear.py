@@ -7,7 +7,7 @@ import pytest
 from cocotb_tests.support.recordings.from_core import MACHINE
 from cocotb_tests.support.recordings.with_mistake import PHASES, Mistake, scaled, table_of, turned, written
 from cocotb_tests.support.slow import slowly
-from fluxproof.diagnosis.session import diagnose
+from fluxproof.diagnosis.session import diagnose, work
 
 
 def answer_to(mistake, tmp_path):
@@ -67,10 +67,11 @@ def test_a_gain_beside_a_wrong_flux_is_not_told_from_another_gain(columns, table
     """
     deviations = {"machine": (("magnet_flux_wb", 0.92 * MACHINE.magnet_flux_wb),)}
     recording, drive = written(Mistake("", scaled(columns, 1.03), dq=table), tmp_path, deviations)
-    answer = diagnose(table_of(recording, tmp_path / "points.csv") if table else recording, drive)
+    worked = work(table_of(recording, tmp_path / "points.csv") if table else recording, drive)
+    answer = worked.answer()
     assert answer.verdict == "ambiguous", answer.sentence
     assert {"current_scale", "udc_gain"} <= {name for group in answer.ambiguity for name in group}
-    fits = {fit.names: fit.value for _, fit in answer.search.weights()}
+    fits = {fit.names: fit.value for _, fit in worked.decision.posterior.weights()}
     pairs = [fits[tuple(sorted(pair))] for pair in (("current_scale", "magnet_flux"), ("magnet_flux", "udc_gain"))]
     assert abs(pairs[0] - pairs[1]) < 2.0
 

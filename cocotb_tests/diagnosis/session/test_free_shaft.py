@@ -5,7 +5,7 @@ import pytest
 
 from cocotb_tests.support.recordings.blind_cases import files_of
 from cocotb_tests.support.slow import slowly
-from fluxproof.diagnosis.session import diagnose
+from fluxproof.diagnosis.session import work
 
 
 @pytest.mark.parametrize(
@@ -18,6 +18,7 @@ from fluxproof.diagnosis.session import diagnose
 def test_cogging_that_the_speed_loop_conceals_is_named(seed, count, number, kind, names, tmp_path):
     """Only slow blocks show it; they were given the noise of the fast ones."""
     recording, drive = files_of(number, tmp_path, seed, "own", count)
-    answer = diagnose(recording, drive)
+    worked = work(recording, drive)
+    answer = worked.answer()
     assert {e.name for e in answer.effects} == names and answer.verdict == "explained"
-    assert set(answer.search.setup.view.shaft) == {kind}
+    assert set(worked.decision.basis.view.shaft) == {kind}

@@ -10,24 +10,24 @@ from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.recordings.with_effect import NOMINAL, T, healthy, usual, with_effect
 from cocotb_tests.support.slow import halved
 from fluxproof.diagnosis import diagnose
-from fluxproof.diagnosis.answer.improve import write_improved
-from fluxproof.diagnosis.answer.locate import at_order, harmonic
-from fluxproof.diagnosis.answer.sizes import Sizes
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.cells import cells_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.command import answer_lines
+from fluxproof.diagnosis.decide.locate import at_order, harmonic
+from fluxproof.diagnosis.decide.sizes import Sizes
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.plant_section import in_addition, read_flux_map
 from fluxproof.diagnosis.ground.recording import from_columns
-from fluxproof.diagnosis.session import run
+from fluxproof.diagnosis.improve.improve import write_improved
+from fluxproof.diagnosis.session import run, work
 
 MOST_LEFT = 0.05  # of the power of the misfit above its noise floor
 
 
-def sizes(answer):
+def sizes(worked):
     """Sizes of the misfit of the drive as described, over all blocks."""
-    setup = answer.search.setup
+    setup = worked.decision.posterior.setup
     return Sizes(setup, setup.cells.y, setup.cells.y, np.ones(len(setup.view), bool), True)
 
 
@@ -37,11 +37,12 @@ def test_the_improved_drive_leaves_no_misfit(name, tmp_path):
     if effect.stays:
         pytest.skip(effect.stays)
     recording = with_effect(effect)
-    answer = diagnose(recording, NOMINAL)
+    first = work(recording, NOMINAL)
+    answer = first.answer()
     assert name in {e.name for e in answer.effects}, (answer.sentence, answer.notes)
     improved = write_improved(NOMINAL, answer.effects, tmp_path / "drive_improved.toml")
-    again = diagnose(recording, improved)
-    before, after = sizes(answer), sizes(again)
+    second = work(recording, improved)
+    again, before, after = second.answer(), sizes(first), sizes(second)
     channel = before.primary()
     left = after.channels[channel].excess / max(before.channels[channel].excess, 1e-12)
     assert again.verdict == "no_mismatch" or left < MOST_LEFT, (left, again.sentence)

@@ -85,7 +85,7 @@ def test_either_of_two_causes_is_not_agreement(tmp_path, size, verdict):
     truth = Truth(r=R + 0.08 * size, v_dead=0.25 * size)
     answer = answer_of(tmp_path, table(truth, points=points, noise_v=0.02))
     assert answer.verdict == verdict, answer.sentence
-    assert answer.ambiguity == ([["dead_time", "resistance"]] if verdict == "ambiguous" else [])
+    assert answer.ambiguity == ((("dead_time", "resistance"),) if verdict == "ambiguous" else ())
     if verdict == "no_mismatch":
         assert not answer.effects and answer.fit.train_before <= 2.0 * answer.fit.noise_floor
     if answer.effects:
@@ -103,7 +103,7 @@ def test_of_a_usual_misfit_effects_explain_the_larger_part_or_are_not_told(tmp_p
         columns[name] += 0.005 * np.random.default_rng(1).standard_normal(len(columns[name]))
     answer = answer_of(tmp_path, columns)
     assert answer.verdict == verdict and not answer.effects, answer.sentence
-    assert answer.ambiguity == ([["dead_time", "resistance"]] if verdict == "ambiguous" else [])
+    assert answer.ambiguity == ((("dead_time", "resistance"),) if verdict == "ambiguous" else ())
     assert answer.fit.train_before > 3.0 * answer.fit.noise_floor
 
 

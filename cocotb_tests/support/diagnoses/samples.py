@@ -71,8 +71,8 @@ def overlay(n: int = 5000) -> dict:
 FIT = Fit("u_dq", "V", 1.18, 0.118, 1.21, 0.121, 0.113)
 WHERE = Location(
     "u_q",
-    [OrderLine(0, 1.14, "V"), OrderLine(6, 0.225, "V"), OrderLine(12, 0.08, "V")],
-    [Region("i_q", 0.2, 5.0, "A", 1.32, 0.41), Region("omega_e", -math.inf, 120.0, "rad/s", 1.2, 0.9)],
+    (OrderLine(0, 1.14, "V"), OrderLine(6, 0.225, "V"), OrderLine(12, 0.08, "V")),
+    (Region("i_q", 0.2, 5.0, "A", 1.32, 0.41), Region("omega_e", -math.inf, 120.0, "rad/s", 1.2, 0.9)),
 )
 DEAD_TIME = NamedEffect(
     "dead_time", 0.998, {"v_dead_v": Estimate(0.9013, 0.0107, "V")}, 0.93, {"inverter.dead_time_s": 1.6e-6}
@@ -93,12 +93,12 @@ SATURATION = NamedEffect(
     0.44,
     {"machine.inductance_q_h": 0.0151, "machine.flux_map": FLUX_MAP},
 )
-ASKED = [
-    Request(314.0, -2.0, 0.0, ["encoder_offset", "inductance_q"], "an offset stays on d at i_q = 0, L_q does not"),
-    Request(-314.0, -2.0, 0.0, ["encoder_offset"], "the offset's voltage turns with the speed", 563.0, 80.0),
-]
+ASKED = (
+    Request(314.0, -2.0, 0.0, ("encoder_offset", "inductance_q"), "an offset stays on d at i_q = 0, L_q does not"),
+    Request(-314.0, -2.0, 0.0, ("encoder_offset",), "the offset's voltage turns with the speed", 563.0, 80.0),
+)
 UNKNOWN = result.UnknownTerm("u_d", "c * omega_e * abs(i_q) * cos(2*theta_e)", 2.31e-3, 4e-5, "V s/(rad A)", 0.88)
-PROBLEMS = [
+PROBLEMS = (
     Problem("gap", "three samples are missing after 1.2044 s", "t", 12044, 3, "the balance is not taken across it"),
     Problem(
         "clipped",
@@ -108,11 +108,11 @@ PROBLEMS = [
         41,
         "those rows are left out",
     ),
-]
-FATAL = [
+)
+FATAL = (
     Problem("current_sum", "the phase currents sum to 3.9 A rms, 0.1 A was expected", "i_c", 0, 200000, fatal=True),
     *PROBLEMS,
-]
+)
 DIFFERENCE = dict(block="current_pi", sample=4711, signal="u_q", bit=7, recorded="0x01A4", golden="0x0124")
 
 
@@ -120,13 +120,13 @@ def made_up() -> dict[str, Diagnosis]:
     """One diagnosis for each verdict."""
     healthy = replace(FIT, train_before=0.114, train_after=0.114, holdout_before=0.115, holdout_after=0.115)
     unexplained = replace(FIT, train_after=0.41, holdout_after=0.44)
-    common = dict(rows=200000, notes=["Friction was not looked at: the recording holds no torque."])
+    common = dict(rows=200000, notes=("Friction was not looked at: the recording holds no torque.",))
     found = dict(location=WHERE, fit=FIT, evidence=evidence(), **common)
     return {
         "explained": Diagnosis(
             "explained",
             "Dead time of 0.90 V, q-axis saturation and an encoder offset of 2.0° explain the recording.",
-            [DEAD_TIME, SATURATION, OFFSET],
+            (DEAD_TIME, SATURATION, OFFSET),
             problems=PROBLEMS,
             digital=result.Digital(True, 200000),
             **found,
@@ -134,18 +134,18 @@ def made_up() -> dict[str, Diagnosis]:
         "ambiguous": Diagnosis(
             "ambiguous",
             "Either the encoder is 2.0° off or L_q is 3 % too high: at one load this recording cannot tell.",
-            [DEAD_TIME],
-            [["encoder_offset", "inductance_q"]],
+            (DEAD_TIME,),
+            (("encoder_offset", "inductance_q"),),
             ASKED,
             **found,
         ),
         "partly_explained": Diagnosis(
             "partly_explained",
             "Dead time of 0.90 V explains 88 % of the misfit's power; the rest is mostly in u_dq at order 2 (0.41 V).",
-            [DEAD_TIME],
+            (DEAD_TIME,),
             **found | dict(fit=unexplained),
             explained_share=0.88,
-            remainder=[result.Remainder("u_dq", 2.0, 0.41, "V", 0.12)],
+            remainder=(result.Remainder("u_dq", 2.0, 0.41, "V", 0.12),),
             unknown_term=UNKNOWN,
         ),
         "unexplained": Diagnosis(

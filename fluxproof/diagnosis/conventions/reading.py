@@ -104,4 +104,4 @@ class Reading:
         if rivals:
             says = f"{says}, or {', or '.join(r.says for r in rivals)} (this recording cannot separate them)"
         code = "pole_pairs" if self.pole_pairs else self.code
-        return Convention(code, self.quantity, self.factor, says, [r.code for r in rivals])
+        return Convention(code, self.quantity, self.factor, says, tuple(r.code for r in rivals))

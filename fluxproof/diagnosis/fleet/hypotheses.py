@@ -13,10 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fluxproof.diagnosis.answer.conclude import measured_torque
-from fluxproof.diagnosis.answer.names import credibilities
-from fluxproof.diagnosis.answer.sizes import UNITS, Sizes
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.decide.credibility import credibilities
+from fluxproof.diagnosis.decide.sizes import UNITS, Sizes, measured_torque
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.result import Remainder
 from fluxproof.diagnosis.inference.posterior import possible

@@ -116,11 +116,11 @@ def load_prior(path, drive) -> Prior:
     return Prior(str(path), len(found.serials), len(rows), rates, tuple(found.populations))
 
 
-def among(prior: Prior, answer) -> Fleet:
-    """Where a diagnosed drive stands among those of the prior."""
+def among(prior: Prior, posterior: Posterior | None) -> Fleet:
+    """Where a diagnosed drive stands among those of the prior; posterior: None if its parameters have none."""
     parts = []
-    if isinstance(answer.search, Posterior):
-        row = {"hypotheses": hypothesis_rows(answer.search)}
+    if posterior is not None:
+        row = {"hypotheses": hypothesis_rows(posterior)}
         never = prior_rate(0.0, prior.recordings)
         rates = {e: prior.rates.get(e, never) for h in row["hypotheses"] for e in h["extras"]}
         values = values_of(weighed(row, rates)) if row["hypotheses"] else {}
@@ -128,7 +128,7 @@ def among(prior: Prior, answer) -> Fleet:
             placed(pop, *values[pop.effect, pop.parameter][:2])
             for pop in prior.populations if (pop.effect, pop.parameter) in values
         ]  # fmt: skip
-    return Fleet(prior.path, prior.drives, prior.recordings, parts)
+    return Fleet(prior.path, prior.drives, prior.recordings, tuple(parts))
 
 
 def placed(pop: Population, value: float, sigma: float) -> InFleet:

@@ -13,8 +13,8 @@ from fluxproof.diagnosis.inference.posterior import Posterior
 REASON = 300  # letters of a reason
 
 
-def row_of(answer: Diagnosis) -> dict:
-    """The columns of a diagnosis; the same answer gives the same row."""
+def row_of(answer: Diagnosis, posterior: Posterior | None) -> dict:
+    """The columns of a diagnosis and of the posterior that it was decided from; the same answer gives the same row."""
     fit, digital, unknown = answer.fit, answer.digital, answer.unknown_term
     failed = answer.verdict == "bad_recording"
     row = {
@@ -39,7 +39,7 @@ def row_of(answer: Diagnosis) -> dict:
         "conventions": [c.code for c in answer.conventions],
         "problems": sorted({p.code for p in answer.problems}),
         "digital": _digital(digital),
-        "hypotheses": [] if failed else _hypotheses(answer),
+        "hypotheses": [] if failed else _hypotheses(answer, posterior),
     }
     return {key: finite(value) for key, value in row.items()}
 
@@ -65,10 +65,10 @@ def _digital(digital) -> str:
     return "equal" if d is None else ", ".join(f"{key} {d.get(key)}" for key in ("block", "sample", "signal", "bit"))
 
 
-def _hypotheses(answer) -> list[dict]:
+def _hypotheses(answer, posterior) -> list[dict]:
     """The sets that a posterior leaves open; one operating point has none: what is named is its only set."""
-    if isinstance(answer.search, Posterior):
-        return hypothesis_rows(answer.search)
+    if posterior is not None:
+        return hypothesis_rows(posterior)
     if answer.verdict in ("digital_mismatch", "bad_recording"):
         return []
     extras = sorted(e.name for e in answer.effects if e.name not in BASE)

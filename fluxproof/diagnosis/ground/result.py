@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The result of a diagnosis: plain dataclasses, converted for diagnosis.json by ``to_json``.
+"""The result of a diagnosis: frozen dataclasses, converted for diagnosis.json by ``to_json``.
 
-The stable part follows docs/diagnosis.schema.json (schema 2).  ``Evidence`` serves the pictures only.
+build.py makes it, once; nothing writes to it afterwards.  The stable part follows docs/diagnosis.schema.json
+(schema 2).  ``Evidence`` serves the pictures only.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ VERDICTS = (
 FILES = ("report.html", "diagnosis.json", "drive_improved.toml", "flux_map.csv")  # of a written result
 
 
-@dataclass
+@dataclass(frozen=True)
 class Estimate:
     """A parameter's value with its standard deviation."""
 
@@ -28,7 +29,7 @@ class Estimate:
     unit: str
 
 
-@dataclass
+@dataclass(frozen=True)
 class NamedEffect:
     """An effect that the tool asserts.
 
@@ -43,20 +44,20 @@ class NamedEffect:
     plant: dict = field(default_factory=dict)
 
 
-@dataclass
+@dataclass(frozen=True)
 class Request:
     """An operating point to record next, which separates tied explanations."""
 
     omega_e: float
     i_d: float
     i_q: float
-    separates: list[str]
+    separates: tuple[str, ...]
     why: str
     u_dc: float | None = None
     temp_winding: float | None = None
 
 
-@dataclass
+@dataclass(frozen=True)
 class OrderLine:
     """A harmonic of the misfit in dq, per electrical turn."""
 
@@ -65,7 +66,7 @@ class OrderLine:
     unit: str
 
 
-@dataclass
+@dataclass(frozen=True)
 class Region:
     """Where the misfit is larger than elsewhere: ``variable`` between low and high; rms inside and outside."""
 
@@ -77,16 +78,16 @@ class Region:
     rms_elsewhere: float
 
 
-@dataclass
+@dataclass(frozen=True)
 class Location:
     """Signal, harmonic orders and operating regions in which the misfit is largest."""
 
     signal: str = ""
-    orders: list[OrderLine] = field(default_factory=list)
-    regions: list[Region] = field(default_factory=list)
+    orders: tuple[OrderLine, ...] = ()
+    regions: tuple[Region, ...] = ()
 
 
-@dataclass
+@dataclass(frozen=True)
 class Fit:
     """rms misfit before and after, on fitted rows and on held-out operating points, and the noise floor."""
 
@@ -111,7 +112,7 @@ class Fit:
         return 1.0 - max(self.holdout_after**2 - self.noise_floor**2, 0.0) / before
 
 
-@dataclass
+@dataclass(frozen=True)
 class Remainder:
     """A part of the misfit that no named effect explains: one harmonic order of one signal.
 
@@ -126,7 +127,7 @@ class Remainder:
     share: float
 
 
-@dataclass
+@dataclass(frozen=True)
 class Convention:
     """A convention of the recording or the drive file that differs from the documented one, found by the balance.
 
@@ -140,10 +141,10 @@ class Convention:
     quantity: str
     factor: float | None
     says: str
-    rivals: list[str] = field(default_factory=list)
+    rivals: tuple[str, ...] = ()
 
 
-@dataclass
+@dataclass(frozen=True)
 class InFleet:
     """A parameter among those of the other drives: mean and spread, the value shrunk to them, and how far it is off.
 
@@ -163,17 +164,17 @@ class InFleet:
     p: float
 
 
-@dataclass
+@dataclass(frozen=True)
 class Fleet:
     """The population that was the prior of a diagnosis, and where the drive stands in it."""
 
     path: str
     drives: int
     recordings: int
-    parameters: list[InFleet] = field(default_factory=list)
+    parameters: tuple[InFleet, ...] = ()
 
 
-@dataclass
+@dataclass(frozen=True)
 class UnknownTerm:
     """The single term that fits the unexplained residual best.
 
@@ -189,7 +190,7 @@ class UnknownTerm:
     meaning: str = ""
 
 
-@dataclass
+@dataclass(frozen=True)
 class Digital:
     """Result of replaying the core.  first_difference: block, sample, signal, bit, recorded, golden."""
 
@@ -198,7 +199,7 @@ class Digital:
     first_difference: dict | None = None
 
 
-@dataclass
+@dataclass(frozen=True)
 class Evidence:
     """Block means of misfit and operating point for the pictures; all arrays have shape (n,) unless stated.
 
@@ -211,38 +212,40 @@ class Evidence:
     torque: bool = False
 
 
-@dataclass
+@dataclass(frozen=True)
 class Diagnosis:
     """The answer to: why does this recording differ from its simulation?"""
 
     verdict: str
     sentence: str
-    effects: list[NamedEffect] = field(default_factory=list)
-    ambiguity: list[list[str]] = field(default_factory=list)
-    next_recording: list[Request] = field(default_factory=list)
-    location: Location = field(default_factory=Location)
-    fit: Fit = field(default_factory=Fit)
+    effects: tuple[NamedEffect, ...] = ()
+    ambiguity: tuple[tuple[str, ...], ...] = ()
+    next_recording: tuple[Request, ...] = ()
+    location: Location = Location()
+    fit: Fit = Fit()
     explained_share: float | None = None  # of the misfit's power above its floor, at held-out points; None: no misfit
-    remainder: list[Remainder] = field(default_factory=list)  # the largest first
-    conventions: list[Convention] = field(default_factory=list)
+    remainder: tuple[Remainder, ...] = ()  # the largest first
+    conventions: tuple[Convention, ...] = ()
     unknown_term: UnknownTerm | None = None
     rows: int = 0
-    problems: list[Problem] = field(default_factory=list)
-    digital: Digital = field(default_factory=Digital)
+    problems: tuple[Problem, ...] = ()
+    digital: Digital = Digital()
     prior: Fleet | None = None  # the fleet whose population was the prior
     details: str = ""  # the figures behind the sentence
     advice: str = ""  # what to do next
-    notes: list[str] = field(default_factory=list)  # for people: assumptions and omissions
+    notes: tuple[str, ...] = ()  # for people: assumptions and omissions
     evidence: Evidence = field(default_factory=Evidence)
-    readings: tuple = ()  # what ``conventions`` tells, as conventions/ applies it
-    search: object = field(default=None, repr=False)  # Posterior; None of one operating point
-    held: np.ndarray | None = field(default=None, repr=False, compare=False)  # (b,) bool, blocks not fitted
 
     def to_json(self) -> dict:
         """The mapping written to diagnosis.json (schema 2)."""
-        inner = {"evidence": Evidence(), "readings": (), "search": None, "held": None}
-        plain = dataclasses.asdict(dataclasses.replace(self, **inner))
-        problems = plain.pop("problems")
-        for key in (*inner, "rows"):
-            plain.pop(key)
-        return {"schema": 2, **plain, "recording": {"rows": self.rows, "problems": problems}}
+        plain = dataclasses.asdict(dataclasses.replace(self, evidence=Evidence()))
+        plain = {key: _listed(value) for key, value in plain.items() if key != "evidence"}
+        rows, problems = plain.pop("rows"), plain.pop("problems")
+        return {"schema": 2, **plain, "recording": {"rows": rows, "problems": problems}}
+
+
+def _listed(value):
+    """The same with a list in place of every tuple, as JSON has no tuples."""
+    if isinstance(value, dict):
+        return {key: _listed(item) for key, item in value.items()}
+    return [_listed(item) for item in value] if isinstance(value, (list, tuple)) else value

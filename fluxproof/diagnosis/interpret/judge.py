@@ -20,6 +20,7 @@ import numpy as np
 from fluxproof.diagnosis.balance.misfit import bulge
 from fluxproof.diagnosis.conventions.reading import Reading
 from fluxproof.diagnosis.conventions.table import pole_pairs_for, readings_for
+from fluxproof.diagnosis.decide.interpretation import is_exact, is_simpler
 from fluxproof.diagnosis.effects.effect import torque_of
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
@@ -50,9 +51,9 @@ class Judged:
 def preferred(recordings, posterior, explained, progress=lambda text: None):
     """(readings, rivals, Posterior) that the data prefer; without readings if what is documented fits best.
 
-    A convention is met exactly and replaces an effect: an interpretation that still needs a scale error for the same
-    quantity, or as many effects as without it, is a coincidence and is rejected.  rivals: readings that leave the
-    same balance; posterior: of the effects as documented; explained: whether these explain the misfit.
+    An interpretation that is not met exactly, or replaces no effect (decide/interpretation.py), is rejected.  rivals:
+    readings that leave the same balance; posterior: of the effects as documented; explained: whether these explain the
+    misfit.
     """
     setup, known = posterior.setup, posterior.best().value
     if len(np.unique(setup.points)) < LEAST_POINTS:
@@ -79,11 +80,8 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
         other = setup.call(Posterior, read, progress)
         value = other.best().value + prior + terms.jacobian(j.readings)
         left = other.best().names
-        exact = not any(set(setup.effects[n].rescales) & r.touches for n in left for r in j.readings)
-        # Other pole pairs scale L_d, L_q and psi: instead of one effect of a plausible size they would be chance.
-        cost = sum(1 + bool(r.pole_pairs and not absurd) for r in j.readings)
-        few = len(left) + cost <= most or (not left and cost == len(j.readings))
-        if value > known and exact and few:
+        met = is_exact(j.readings, left, setup.effects) and is_simpler(j.readings, left, most, absurd)
+        if value > known and met:
             best, known, found = j, value, other
         if best is j and not other.best().names:
             break  # nothing is left that another reading could explain

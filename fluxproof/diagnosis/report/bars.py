@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.answer.phrases import SIGNALS
 from fluxproof.diagnosis.ground.result import Fit
 from fluxproof.diagnosis.report import theme
 from fluxproof.diagnosis.report.maps import LeftOut
 from fluxproof.diagnosis.report.words import effect_text, explained, percent
+from fluxproof.diagnosis.words.phrases import SIGNALS
 
 LONGEST = 34  # letters of a label beside a bar
 

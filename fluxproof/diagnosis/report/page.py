@@ -9,12 +9,12 @@ from __future__ import annotations
 from pathlib import Path
 from types import SimpleNamespace
 
-from fluxproof.diagnosis.answer.improved_core import core_values
-from fluxproof.diagnosis.answer.phrases import SIGNALS
 from fluxproof.diagnosis.ground.nominal import SECTIONS
 from fluxproof.diagnosis.ground.plant_section import merged, plant_of
 from fluxproof.diagnosis.ground.quantities import RPM
+from fluxproof.diagnosis.improve.improved_core import core_values
 from fluxproof.diagnosis.report import pictures, words
+from fluxproof.diagnosis.words.phrases import SIGNALS
 from fluxproof.quote import pages
 
 FOLDER = Path(__file__).resolve().parent

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One operating point: what drifts while it is held, and a constant misfit."""
+
+from __future__ import annotations
+
+import pytest
+
+from cocotb_tests.support.diagnoses.answers import answer_of, found, said, without
+from cocotb_tests.support.drives import PSI
+from cocotb_tests.support.recordings.bench_logs import Truth, table, warming
+
+WEAK = Truth(psi=0.95 * PSI)
+
+
+def test_one_point_that_warms_up(tmp_path):
+    answer = answer_of(tmp_path, warming())
+    assert answer.verdict == "explained"
+    values = found(answer)
+    assert values["magnet_flux_drift_wb"] == pytest.approx(-0.05 * PSI, rel=0.06)
+    assert values["resistance_temp_coeff_per_k"] == pytest.approx(0.0039, rel=0.1)
+    assert answer.fit.holdout_after < answer.fit.noise_floor < 0.1 * answer.fit.holdout_before
+    assert said(answer, "One operating point") and said(answer, "winding temperature was recorded from")
+    faster = found(answer_of(tmp_path, warming(hours=0.2, step_s=0.1)))
+    assert faster["magnet_flux_drift_wb"] == pytest.approx(-0.05 * PSI, rel=0.03)
+    assert faster["resistance_temp_coeff_per_k"] == pytest.approx(0.0039, rel=0.1)
+    steady = answer_of(tmp_path, warming(magnets=0.0, copper=0.0))
+    assert steady.verdict == "no_mismatch" and not steady.effects
+
+
+def test_one_point_without_i_d_cannot_separate_winding_and_magnets(tmp_path):
+    blind = answer_of(tmp_path, without(warming(i=4j), "temp_winding"))
+    assert blind.verdict == "ambiguous" and blind.ambiguity == (("magnet_temperature", "resistance_temperature"),)
+    assert len({(r.omega_e, r.i_d, r.i_q) for r in blind.next_recording}) == 3
+    known = answer_of(tmp_path, warming(i=4j))
+    (magnets,) = known.effects
+    drift = magnets.parameters["magnet_flux_drift_wb"]
+    assert abs(drift.value + 0.05 * PSI) < 2.0 * drift.sigma  # copper may hide a part of it
+
+
+def test_a_constant_misfit_at_one_point_is_an_ambiguity(tmp_path):
+    columns = warming(magnets=0.0, copper=0.0)
+    columns["u_q_ref"] = 1.04 * columns["u_q_ref"]
+    answer = answer_of(tmp_path, columns)
+    assert answer.verdict == "ambiguous" and not answer.effects
+    assert {"magnet_flux", "udc_gain"} <= set(answer.ambiguity[-1]) and said(answer, "one point cannot show why")
+    assert answer.fit.train_before == pytest.approx(2.63, abs=0.02) and answer.explained_share > 0.99
+    assert answer.fit.train_after < answer.fit.noise_floor and answer.fit.holdout_after < answer.fit.noise_floor
+    two_rows = answer_of(tmp_path, table(WEAK, points=[(300.0, 0.0, 4.0)] * 2))
+    assert two_rows.fit.train_before > 2.0 > two_rows.fit.train_after
+    assert two_rows.verdict == "ambiguous" and "magnet_flux" in two_rows.ambiguity[0]
+
+
+def test_a_constant_misfit_that_nothing_explains_is_the_remainder(tmp_path):
+    columns = warming()
+    columns["u_d_ref"] = columns["u_d_ref"] + 60.0
+    columns["u_q_ref"] = 0.7 * columns["u_q_ref"]
+    answer = answer_of(tmp_path, columns)
+    assert answer.verdict == "unexplained" and answer.explained_share == 0.0 and not answer.effects
+    assert answer.fit.holdout_after == answer.fit.holdout_before == pytest.approx(63.2, abs=0.5)
+    assert [part.size for part in answer.remainder] == [pytest.approx(63.2, abs=0.5)]
+    assert said(answer, "would explain the drift; not reported, as")
+    assert [p.code for p in answer.problems] == ["slow_sampling"]  # at one point a change of signs fits by chance

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What points that were not fitted decide: an effect that worsens their prediction is rejected."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fluxproof.diagnosis.decide.names import names_of
+from fluxproof.diagnosis.ground import constants as k
+
+
+def without_idle(posterior, held):
+    """The posterior without effects that worsen the prediction at held-out points, whatever their probability.
+
+    The others are judged again without them; ``posterior.idle`` holds those that were rejected.
+    """
+    while True:
+        names = names_of(posterior)
+        asserted = names.asserted
+        idle = {n for n in asserted & set(posterior.best().names) if not helps(posterior, n, asserted, held)}
+        if not idle:
+            return posterior
+        posterior = posterior.within({n for _, fit in names.fits for n in fit.names} - idle, idle)
+
+
+def helps(posterior, name, asserted, held) -> bool:
+    """Whether ``asserted`` leaves no less of the held-out blocks, in units of the usual error, without ``name``.
+
+    Rows beyond the fitted operating points, of which the coefficients' own uncertainty exceeds that error, do not
+    count, but for a mean torque in which a load may act, as that uncertainty is the load's.  The torque counts without
+    a transducer too: friction and cogging of a free shaft show nowhere else.  Where a load may act that nobody
+    recorded, what is left counts up to a limit.
+    """
+    best, setup = posterior.best(), posterior.setup
+    cells, floor2 = setup.cells, setup.usual**2
+    loads = (cells.channel == "torque") & (cells.order == 0) & (setup.load > 0.0)
+    rows = np.flatnonzero(cells.ok & held[cells.block])
+    rows = rows[loads[rows] | (_uncertain(best, asserted, rows) <= floor2[rows])]
+    fewer = best.problem.fit([n for n in best.names if n != name])
+    left2 = [fit.left(asserted & set(fit.names))[rows] ** 2 for fit in (best, fewer)]
+    left2 = [np.where(loads[rows], np.minimum(x, k.DISCREPANCY**2 * floor2[rows]), x) for x in left2]
+    left = np.zeros(2)
+    # The ripple of a free shaft's acceleration is mostly noise, beside which its mean would not count.
+    channels = np.where((cells.channel == "torque") & (cells.order == 0), "mean torque", cells.channel)[rows]
+    for channel in np.unique(channels):
+        mine = channels == channel
+        left += [x[mine].sum() / floor2[rows][mine].sum() for x in left2]
+    return left[1] >= left[0]
+
+
+def _uncertain(fit, effects, rows) -> np.ndarray:
+    """Variance of what some effects of a fit explain of some rows, (k,)."""
+    mine = [j for j, n in enumerate(fit.take) if fit.problem.keys[n][0] in effects]
+    keys = [fit.problem.keys[fit.take[j]] for j in mine]
+    x = np.array([fit.problem.cells.columns[name][key][rows] for name, key in keys]).reshape(len(mine), len(rows))
+    return np.sum(x * (fit.cov[np.ix_(mine, mine)] @ x), axis=0)

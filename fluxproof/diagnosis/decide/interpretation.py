@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What decides whether recording or drive file are asserted to mean something else than documented.
+
+interpret/ finds the interpretation that fits best.  It is a mistaken convention and no coincidence if it is met exactly
+and replaces effects (``is_exact``, ``is_simpler``), and it is asserted if it explains enough (``under``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from fluxproof.diagnosis.decide.decision import Decision
+from fluxproof.diagnosis.decide.verdict import kind_as_interpreted
+from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.result import Evidence, Fit, Remainder
+
+OF_THE_REST = ("after", "noise", "spectrum_after")  # arrays of the evidence in true volts
+
+
+def is_exact(readings, left, effects) -> bool:
+    """Whether no effect that is still needed rescales a quantity that an interpretation rescales already.
+
+    Currents in rms that still need a gain error of a few per cent are a gain error by chance near that factor.
+    """
+    return not any(set(effects[n].rescales) & r.touches for n in left for r in readings)
+
+
+def is_simpler(readings, left, most, absurd) -> bool:
+    """Whether the interpretations, and the effects ``left`` beside them, are no more than ``most`` effects without.
+
+    Other pole pairs scale L_d, L_q and psi: instead of one effect of a plausible size they would be chance; absurd:
+    whether the effects without an interpretation have sizes outside of what is plausible.
+    """
+    cost = sum(1 + bool(r.pole_pairs and not absurd) for r in readings)
+    return len(left) + cost <= most or (not left and cost == len(readings))
+
+
+def under(readings, rivals, documented: Decision, found: Decision, level: float) -> Decision:
+    """``found``, decided with the readings, as a decision on the recording as it is; level: rms of its voltage [V].
+
+    ``documented`` if nothing is explained with them: they must explain half of the misfit and of the voltage, as a
+    recording in other units leaves a misfit that is nearly all of the simulation's voltage.
+    Voltages are those of the recording: where the bus is recorded at half, the residual is given in recorded volts.
+    readings: tuple of Reading; rivals: list of those that fit as well as the only one.  documented: the decision
+    without readings, for the misfit before.
+    """
+    volts = 1.0
+    for reading in readings:
+        volts *= reading.volts
+    fit = _fit(documented.fit, found.fit, volts)
+    remainder = tuple(_recorded(part, volts) for part in found.remainder)
+    kind = kind_as_interpreted(found.verdict, fit.explained_share, remainder)
+    if kind == "unexplained" or fit.holdout_after**2 > k.HALF * level**2:
+        return replace(documented, hinted=readings)
+    return replace(
+        found,
+        verdict=kind,
+        location=documented.location,
+        fit=fit,
+        explained_share=fit.explained_share,
+        remainder=remainder,
+        conventions=tuple(r.told(rivals) for r in readings),
+        readings=readings,
+        evidence=_evidence(documented.evidence, found.evidence, volts),
+    )
+
+
+def restated(decision: Decision, changed) -> Decision:
+    """The decision with a key of the drive file that had to be changed for the recording to be usable at all.
+
+    changed: loading.restated.Restated, or None.
+    """
+    if changed is None or decision.basis is None:
+        return decision
+    return replace(
+        decision,
+        verdict="explained" if decision.verdict == "no_mismatch" else decision.verdict,
+        readings=(changed, *decision.readings),
+        conventions=(changed.told(), *decision.conventions),
+    )
+
+
+def _fit(documented: Fit, found: Fit, volts) -> Fit:
+    """The misfit before as documented, and after in recorded volts."""
+    return replace(
+        documented,
+        train_after=found.train_after / volts,
+        holdout_after=found.holdout_after / volts,
+        noise_floor=found.noise_floor / volts,
+    )
+
+
+def _recorded(part: Remainder, volts) -> Remainder:
+    return replace(part, size=part.size / volts) if part.unit == "V" else part
+
+
+def _evidence(documented: Evidence, found: Evidence, volts) -> Evidence:
+    """The arrays of ``found`` with the misfit before as documented, the rest in recorded volts."""
+    arrays, old = dict(found.arrays), documented.arrays
+    for name, values in found.arrays.items():
+        if name.startswith(("before", "spectrum_before")) and name in old:
+            arrays[name] = old[name]
+        elif name.startswith(OF_THE_REST):
+            arrays[name] = values / volts
+    return replace(found, arrays=arrays)

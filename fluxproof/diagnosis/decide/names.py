@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which effects are named, which are ambiguous, and with what confidence.
+
+The confidence in a name is the probability of its presence, the sum over all sets that contain it, times its mean
+credibility in them (credibility.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from fluxproof.diagnosis.decide.ambiguity import ambiguities
+from fluxproof.diagnosis.decide.credibility import credibilities
+from fluxproof.diagnosis.ground import constants as k
+
+
+@dataclass(frozen=True)
+class Names:
+    """named: {effect: probability}; ambiguous: groups of which one effect is present.
+
+    possible: {effect: probability} of effects that are neither named nor an alternative.  suspects: {effect:
+    probability} of causes that are as sure as a name but that no simulation carries.  fits: [(probability, fit)] of the
+    sets that hold the mass of the posterior, the most probable first.
+    """
+
+    named: dict[str, float]
+    ambiguous: tuple[tuple[str, ...], ...]
+    possible: dict[str, float]
+    suspects: dict[str, float] = field(default_factory=dict)
+    fits: tuple = ()
+
+    @property
+    def asserted(self) -> set[str]:
+        """Effects that are named or in an ambiguity."""
+        return set(self.named) | {n for group in self.ambiguous for n in group}
+
+    def only_possible(self, fit) -> set[str]:
+        """Effects of a fit that are neither named, nor an alternative, nor as sure as a name."""
+        return set(fit.names) - self.asserted - set(self.suspects)
+
+    def withheld(self, but=frozenset()) -> Names:
+        """The same with nothing asserted but the effects ``but``: what else was named is possible."""
+        kept = {n: p for n, p in self.named.items() if n in but}
+        possible = {n: p for n, p in self.named.items() if n not in but}
+        groups = tuple(g for g in self.ambiguous if but.issuperset(g))
+        return Names(kept, groups, self.possible | possible, {}, self.fits)
+
+
+def names_of(posterior) -> Names:
+    """Names and ambiguities of a posterior."""
+    kept = _mass(posterior)
+    best, effects = posterior.best(), posterior.setup.effects
+    real, weight = {}, {}
+    for p, fit in kept:
+        for name, credit in credibilities(fit).items():
+            real[name] = real.get(name, 0.0) + p * credit
+            weight[name] = weight.get(name, 0.0) + p
+    present = {n: p * real[n] / weight[n] for n, p in posterior.present().items() if n in real}
+    sure = {n: p for n, p in present.items() if p >= 1.0 - k.DOUBTED and n in best.names}
+    named = {n: p for n, p in sure.items() if effects[n].named}
+    suspects = {n: p for n, p in sure.items() if not effects[n].named}
+    groups = ambiguities(kept, present, sure, effects)
+    grouped = {n for g in groups for n in g}
+    possible = {n: p for n, p in present.items() if n not in sure and n not in grouped and p >= k.PRESENT}
+    return Names(named, groups, possible, suspects, tuple(kept))
+
+
+def _mass(posterior) -> list:
+    """[(probability, fit)] of the most probable sets, up to all but LEFT_OUT of the mass."""
+    held, kept = 0.0, []
+    for p, fit in posterior.weights():
+        kept.append((p, fit))
+        held += p
+        if held >= 1.0 - k.LEFT_OUT:
+            break
+    return kept

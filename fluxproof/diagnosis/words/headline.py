@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The headline of every verdict, in at most two lines.
+
+Titles of effects and parameters are those that the effects declare.  Where a headline would be longer than
+MOST_LETTERS letters, it says less of each effect, then of fewer effects; the whole is in details.py and in the table
+of effects.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.quantities import ascii_of, quantity
+from fluxproof.diagnosis.words.phrases import (
+    as_if,
+    capital,
+    corrected,
+    joined,
+    located,
+    percent_below,
+    said,
+    title_of,
+)
+
+MOST_LETTERS = 200  # two lines of a terminal or of the report; only what the checks or the replay found may be longer
+
+
+def headline(answer, effects) -> str:
+    """The verdict of an answer as a headline; effects: the catalogue."""
+    variants = _variants(answer, effects)
+    return next((text for text in variants if len(text) <= MOST_LETTERS), variants[-1])
+
+
+def _variants(answer, effects) -> list[str]:
+    """The headline from the most detailed one to the shortest."""
+    if answer.verdict == "bad_recording":
+        worst = next(p for p in answer.problems if p.fatal)
+        return [f"The recording cannot be used: {worst.located()}"]
+    if answer.verdict == "digital_mismatch":
+        return [_mismatch(answer.digital.first_difference)]
+    misfit = ascii_of(quantity(answer.fit.train_before, answer.fit.unit, 3))
+    if answer.verdict == "no_mismatch":
+        at_floor = answer.fit.train_before**2 <= (1.0 + k.FLOOR) * answer.fit.noise_floor**2
+        usual = "is at the noise floor" if at_floor else "is within the usual error for this kind of recording"
+        floor = f"the misfit of {misfit} {usual}"
+        if found := corrected(answer):
+            once = [joined(found), f"{found[0]}, and {len(found) - 1} more", "the columns are interpreted differently"]
+            return [f"Simulation and recording agree once corrected: {what}. {capital(floor)}." for what in once]
+        return [f"Simulation and recording agree: {floor}."]
+    if answer.verdict == "explained":
+        return [f"{capital(what)}." for what in _named(answer, effects)]
+    named, sets = _named(answer, effects, brackets=True), _sets(answer.ambiguity, effects)
+    if answer.verdict == "ambiguous":
+        if not answer.effects:
+            return [f"This recording cannot separate {group}." for group in sets]
+        return [f"{capital(a)}; not separable: {b}." for a, b in _both(named, sets)]
+    where, cause = located(answer), _cause(answer)
+    if answer.verdict == "partly_explained":
+        several = len(answer.effects) + len(answer.conventions) + len(answer.ambiguity) > 1
+        verb = "explain" if several else "explains"
+        share = f"{verb} {percent_below(answer.explained_share or 0.0)} of the misfit"
+        if answer.ambiguity:
+            one_of = [f"one of {group}" for group in sets]
+            pairs = [f"{a}, with {b}," for a, b in _both(named, one_of)]
+            names = [capital(n) for n in ([*pairs, f"{named[-1]} and others"] if answer.effects else one_of)]
+        else:
+            names = [capital(n) for n in named]
+        return [f"{n} {share}; the residual is {where} and {c}." for n, c in _both(names, cause)]
+    if answer.unknown_term is not None and answer.unknown_term.meaning:
+        return [f"No parameter of the simulation explains the misfit of {misfit}: it {c}." for c in cause]
+    return [f"Unknown: no effect of the catalogue explains half of the misfit of {misfit}, {where}."]
+
+
+def _mismatch(d: dict) -> str:
+    """Block, sample, signal and bit of the first difference, and its cause if one was found."""
+    text = (
+        f"The controller's output differs from its golden model: block {d['block']}, sample {d['sample']}, "
+        f"signal {d['signal']}, bit {d['bit']} (recorded {d['recorded']}, golden model {d['golden']})"
+    )
+    return f"{text}; {d['cause']}." if d.get("cause") else f"{text}."
+
+
+def _both(first, second) -> list[tuple[str, str]]:
+    """Pairs of two texts that become shorter, those that say most first."""
+    places = sorted(itertools.product(range(len(first)), range(len(second))), key=lambda at: (sum(at), at[1]))
+    return [(first[m], second[n]) for m, n in places]
+
+
+def _named(answer, effects, brackets=False) -> list[str]:
+    """The named effects: with all parameters, with their main one, without any, and the first two of them."""
+    first = [c.says for c in answer.conventions]
+    listed = lambda texts: joined([*first, *texts]) if brackets else "; ".join([*first, *texts])  # noqa: E731
+    titles = [title_of(e.name, effects) for e in answer.effects]
+    shown = max(2 - len(first), 0)
+    few = [*titles[:shown], f"{len(titles) - shown} more effects"] if len(titles) > 3 else titles
+    sized = [listed([said(e, effects, most, brackets) for e in answer.effects]) for most in (None, 1)]
+    return [*sized, joined([*first, *titles]), joined([*first, *few])]
+
+
+def _sets(groups, effects) -> list[str]:
+    """The ambiguities: all members of each set, the first two of each, and their number."""
+    titles = [[title_of(n, effects) for n in group] for group in groups]
+    short = [t if len(t) < 4 else [*t[:2], f"{len(t) - 2} other effects"] for t in titles]
+    texts = ["; and ".join(joined(t) for t in each) for each in (titles, short)]
+    others = sum(map(len, titles)) - 1
+    return [*texts, f"{titles[0][0]} and {others} other effect{'s' if others > 1 else ''}" if titles else ""]
+
+
+def _cause(answer) -> list[str]:
+    """What the residual looks like."""
+    u = answer.unknown_term
+    if u is not None and u.meaning:
+        without = "looks like a cause without a parameter in the simulation"
+        return [f"looks {as_if(u)}", f"looks as if {u.meaning}", without]
+    return ["its cause is not known"]
