@@ -19,6 +19,7 @@ from fluxproof.diagnosis.ground.recording import Recording
 from fluxproof.diagnosis.ground.result import Diagnosis
 from fluxproof.diagnosis.inference.linearise import Rows
 from fluxproof.diagnosis.inference.posterior import Posterior
+from fluxproof.diagnosis.inference.search import search
 from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.interpret.judge import preferred
 from fluxproof.diagnosis.interpret.tell import under
@@ -80,7 +81,7 @@ def _posterior(view, held, progress, shifts) -> Posterior:
     progress("sets of effects")
     setup = Setup.of(rows_of(view, held))
     setup.shifts = dict(shifts or {})
-    return Posterior(setup, progress)
+    return search(setup, progress)
 
 
 def _physics(recordings, nominal, progress, shifts) -> Diagnosis:

@@ -8,8 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from fluxproof.diagnosis.effects.effect import FluxEffect
-from fluxproof.diagnosis.inference.posterior import possible
-from fluxproof.diagnosis.inference.problem import covariance_of
+from fluxproof.diagnosis.inference.fitted_set import covariance_of, possible
 from fluxproof.diagnosis.inference.settle import around, fit_of_set, settled
 from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.plant import FluxMap

@@ -13,7 +13,7 @@ from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.ground import constants
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import RecordingError
-from fluxproof.diagnosis.inference.posterior import Posterior
+from fluxproof.diagnosis.inference.search import search
 from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.interpret.judge import preferred
 from fluxproof.diagnosis.interpret.tell import under
@@ -75,7 +75,7 @@ class Case:
     def said(self) -> dict:
         """What is said now, as the diagnosis does (physics.py)."""
         steps = self.steps
-        posterior = steps(Posterior, steps(Setup.of, self.rows, steps))
+        posterior = steps(search, steps(Setup.of, self.rows, steps))
         j = steps(judge, posterior, self.held)
         plain = said(j.kind, j.names.confidence, j.names.open)
         if j.kind == "no_mismatch":

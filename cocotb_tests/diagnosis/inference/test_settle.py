@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The iteration of a set of effects around its own solution."""
 
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,11 +10,21 @@ import pytest
 from fluxproof.diagnosis.inference import settle
 
 
+@dataclass
+class Fit:
+    """What the iteration reads of a fitted set."""
+
+    vector: np.ndarray
+    c: dict
+    problem: SimpleNamespace
+    names: tuple = ("offset",)
+    take: np.ndarray = field(default_factory=lambda: np.array([0]))
+    cov: np.ndarray = field(default_factory=lambda: np.array([[1e-4]]))
+    stands: bool = False
+
+
 def fit_at(x, key="a"):
-    return SimpleNamespace(
-        names=("offset",), c={"offset": {key: x}}, take=np.array([0]), vector=np.array([x]),
-        cov=np.array([[1e-4]]), stands=False, problem=SimpleNamespace(keys=[("offset", key), ("offset", "b")]),
-    )  # fmt: skip
+    return Fit(np.array([x]), {"offset": {key: x}}, SimpleNamespace(keys=[("offset", key), ("offset", "b")]))
 
 
 def swinging(slope, goal=1.0):

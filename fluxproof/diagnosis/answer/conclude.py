@@ -21,8 +21,9 @@ from fluxproof.diagnosis.answer.verdict import at_floor, is_usual, kind_of
 from fluxproof.diagnosis.balance.orders import at_order
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.result import Diagnosis, UnknownTerm
+from fluxproof.diagnosis.inference.fitted_set import covariance_of
 from fluxproof.diagnosis.inference.posterior import Posterior
-from fluxproof.diagnosis.inference.problem import covariance_of
+from fluxproof.diagnosis.inference.search import within
 
 MOST_RIVALS = 5
 
@@ -97,7 +98,7 @@ def shown(posterior, held):
         idle = {n for n in told & set(posterior.best().names) if not helps(posterior, n, told, held)}
         if not idle:
             return posterior
-        posterior = posterior.within({n for _, fit in names.fits for n in fit.names} - idle, idle)
+        posterior = within(posterior, {n for _, fit in names.fits for n in fit.names} - idle, idle)
 
 
 def helps(posterior, name, told, held) -> bool:

@@ -19,8 +19,7 @@ from fluxproof.diagnosis.answer.sizes import UNITS, Sizes
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.result import Remainder
-from fluxproof.diagnosis.inference.posterior import possible
-from fluxproof.diagnosis.inference.problem import covariance_of, log_too_small
+from fluxproof.diagnosis.inference.fitted_set import covariance_of, log_too_small, possible
 from fluxproof.diagnosis.inference.settle import around, settled
 
 BASE = tuple(name for name, effect in CATALOGUE.items() if effect.spreads)

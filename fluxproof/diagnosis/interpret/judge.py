@@ -23,11 +23,12 @@ from fluxproof.diagnosis.conventions.table import pole_pairs_for, readings_for
 from fluxproof.diagnosis.effects.effect import torque_of
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
+from fluxproof.diagnosis.inference.fitted_set import implausible
 from fluxproof.diagnosis.inference.linearise import Rows
 from fluxproof.diagnosis.inference.model import no_columns
 from fluxproof.diagnosis.inference.points import condense
-from fluxproof.diagnosis.inference.posterior import Posterior
-from fluxproof.diagnosis.inference.problem import Problem, implausible
+from fluxproof.diagnosis.inference.problem import Problem
+from fluxproof.diagnosis.inference.search import search
 from fluxproof.diagnosis.inference.setup import Setup
 
 WIDE = 6  # readings to which a second one is added
@@ -76,7 +77,7 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
             continue
         progress(f"interpretation: {j.readings[0].says}")
         read = setup.call(_read, setup, tuple(r.code for r in j.readings))
-        other = setup.call(Posterior, read, progress)
+        other = setup.call(search, read, progress)
         value = other.best().value + prior + terms.jacobian(j.readings)
         left = other.best().names
         exact = not any(set(setup.effects[n].rescales) & r.touches for n in left for r in j.readings)
