@@ -32,9 +32,6 @@ from fluxproof.diagnosis.inference.drift_fit import (
 )
 from fluxproof.diagnosis.inference.fit import Fitter
 
-LEAST_MEANS = 12  # over time; fewer do not determine a drift
-CONSTANT = (1e-3, 5e-3)  # of the bus and of the voltage: a smaller constant misfit may be ripple or resolution
-FITS = 3.0  # standard deviations within which a single effect explains the constant misfit
 OTHER_SPEED = 0.4  # of the recorded one, for a request
 
 
@@ -43,7 +40,7 @@ def diagnose_one_point(view) -> Diagnosis:
     effects = view.visible(CATALOGUE)
     cells = cells_of(view, effects.values())
     raw = at_order(cells, cells.y, 0.0)
-    centred, long = centred_cells(cells), len(view) >= LEAST_MEANS and view.span_s > 0.0
+    centred, long = centred_cells(cells), len(view) >= k.LEAST_MEANS and view.span_s > 0.0
     drifting = [n for n, effect in effects.items() if long and drifts(cells, centred, n, effect)]
     sigma = row_sigmas(view, cells, raw)
     held = holdout_blocks(view) & long
@@ -117,8 +114,7 @@ def _with_constant(fit, size, known) -> Fit:
 
 def _resolution(view) -> float:
     """Size of a constant misfit [V] that may be due to ripple or resolution."""
-    bus, level = CONSTANT
-    return bus * view.nominal.inverter.dc_bus_v + level * float(voltage_level(view).mean())
+    return k.CONSTANT_DC * view.nominal.inverter.dc_bus_v + k.CONSTANT_U * float(voltage_level(view).mean())
 
 
 def _explaining(view, cells, effects, drifting, constant) -> list[str]:
@@ -134,7 +130,7 @@ def _explaining(view, cells, effects, drifting, constant) -> list[str]:
             continue
         value = (np.conj(means[most]) * constant).real / abs(means[most]) ** 2
         c = {key: value if key == most else 0.0 for key in cores}
-        close = abs(constant - value * means[most]) < FITS * limit
+        close = abs(constant - value * means[most]) < k.FITS * limit
         if close and effect.possible(c, np.zeros((len(c),) * 2), view.nominal) and not effect.too_large(c, view):
             out.append(name)
     return sorted(out)
@@ -198,7 +194,7 @@ def _notes(view, constant, candidates, held, long) -> list[str]:
         f"{point} in {len(view)} means over {view.span_s:.4g} s, {int(held.sum())} of them held out: only changes "
         "over time can be diagnosed."
         if long
-        else f"{point} with {len(view)} steady stretches; at least {LEAST_MEANS} with time stamps are needed to "
+        else f"{point} with {len(view)} steady stretches; at least {k.LEAST_MEANS} with time stamps are needed to "
         "detect a drift."
     ]
     if np.isfinite(view.temp).all():

@@ -24,7 +24,10 @@ from studies.sensitivity.steps import Steps, recorded, varied
 
 FACTORS = (0.5, 2.0)
 # Read at one operating point alone, which has no posterior.
-OF_ONE_POINT = ("LEFTOVER", "FLOOR_SHARE", "NAMED_SHARE", "PER_EFFECT")
+OF_ONE_POINT = (
+    *("LEFTOVER", "FLOOR_SHARE", "NAMED_SHARE", "PER_EFFECT", "LEAST_MEANS", "DRIFTS", "TIE", "SAME_COLUMN"),
+    *("CONSTANT_DC", "CONSTANT_U", "FITS"),
+)
 
 
 def names() -> list[str]:

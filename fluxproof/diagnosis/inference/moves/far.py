@@ -6,19 +6,18 @@ from dataclasses import replace
 import numpy as np
 
 from fluxproof.diagnosis.balance.cells import voltage_level
+from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.fitted_set import FittedSet, possible
 from fluxproof.diagnosis.inference.judged import SETTLED, Judged, Names
 from fluxproof.diagnosis.inference.moves.neighbours import near
 from fluxproof.diagnosis.inference.settle import around, fit_at, settled
-
-FAR = 0.3  # of the voltage: only a larger misfit can be of an effect that is far from linear
 
 
 def far(judged: Judged, best: Names):
     """Approach an effect from its ``starts``, and judge sets around it: an angle that is off by a radian."""
     setup = judged.setup
     means = (setup.cells.channel == "u") & (setup.cells.order == 0.0)
-    if np.sum(setup.cells.y[means] ** 2) < FAR**2 * np.sum(voltage_level(setup.view) ** 2):
+    if np.sum(setup.cells.y[means] ** 2) < k.FAR**2 * np.sum(voltage_level(setup.view) ** 2):
         return
     for name in judged.first.able():
         fit = _approached(setup, name)
