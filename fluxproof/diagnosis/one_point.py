@@ -30,7 +30,7 @@ from fluxproof.diagnosis.inference.drift_fit import (
     row_sigmas,
     with_copper,
 )
-from fluxproof.diagnosis.inference.fit import Fitter
+from fluxproof.diagnosis.inference.least_squares import Fitter
 
 OTHER_SPEED = 0.4  # of the recorded one, for a request
 

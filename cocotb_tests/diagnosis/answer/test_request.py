@@ -13,7 +13,7 @@ from fluxproof.diagnosis.answer.request import grid, known_of, new_axes, request
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.ground.nominal import load_nominal
-from fluxproof.diagnosis.inference.settle import fit_of_set
+from fluxproof.diagnosis.inference.converge import fit_of_set
 from fluxproof.diagnosis.inference.setup import Setup
 
 NOMINAL = load_nominal(PAPER)

@@ -19,10 +19,10 @@ from fluxproof.diagnosis.answer.sizes import UNITS, Sizes
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.result import Remainder
+from fluxproof.diagnosis.inference.converge import around
 from fluxproof.diagnosis.inference.fitted_set import FittedSet, covariance_of, log_too_small
 from fluxproof.diagnosis.inference.judged import CLOSE, Judged, Names
 from fluxproof.diagnosis.inference.search import until_it_stands
-from fluxproof.diagnosis.inference.settle import around
 
 BASE = tuple(name for name, effect in CATALOGUE.items() if effect.spreads)
 KEPT = 8  # sets of a recording that go into its row

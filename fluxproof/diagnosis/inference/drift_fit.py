@@ -16,7 +16,7 @@ from fluxproof.diagnosis.balance.orders import at_order
 from fluxproof.diagnosis.catalogue.resistance_temperature import COPPER
 from fluxproof.diagnosis.ground import constants
 from fluxproof.diagnosis.ground.arrays import Complex
-from fluxproof.diagnosis.inference.fit import Fitter, Model
+from fluxproof.diagnosis.inference.least_squares import Fitter, Model
 
 
 def centred_cells(cells):

@@ -9,15 +9,15 @@ from functools import cached_property
 
 import numpy as np
 
+from fluxproof.diagnosis.inference.converge import converged
 from fluxproof.diagnosis.inference.fitted_set import FittedSet, possible
 from fluxproof.diagnosis.inference.problem import Problem
-from fluxproof.diagnosis.inference.settle import settled
 from fluxproof.diagnosis.inference.setup import Setup
 
 Names = tuple[str, ...]
 MOST_EFFECTS = 6
 CLOSE = 20.0  # log evidence below the best within which linearising a set on its own is worth the effort
-SETTLED = 12  # most linearisations of a set that has to stand
+CONVERGED = 12  # most linearisations of a set that has to stand
 
 
 def of_posterior(fit: FittedSet) -> float:
@@ -64,7 +64,7 @@ class Judged:
 
     def linearise(self, names: Names, steps=3):
         """Judge a set on its own linearisation."""
-        found = settled(self.setup, self.fits[names], steps)
+        found = converged(self.setup, self.fits[names], steps)
         if found is None:
             self.fits[names] = replace(self.fits[names], value=-np.inf, own=True)
         else:

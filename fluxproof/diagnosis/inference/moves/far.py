@@ -7,10 +7,10 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.inference.converge import around, converged, fit_at
 from fluxproof.diagnosis.inference.fitted_set import FittedSet, possible
-from fluxproof.diagnosis.inference.judged import SETTLED, Judged, Names
+from fluxproof.diagnosis.inference.judged import CONVERGED, Judged, Names
 from fluxproof.diagnosis.inference.moves.neighbours import near
-from fluxproof.diagnosis.inference.settle import around, fit_at, settled
 
 
 def far(judged: Judged, best: Names):
@@ -32,5 +32,5 @@ def _approached(setup, name) -> FittedSet | None:
     """An effect alone where it stands after an approach from the best of its starts, or None."""
     tried = [fit_at(setup, {name: c}) for c in setup.effects[name].starts]
     nearest = max((f for f in tried if f is not None), key=lambda f: f.value, default=None)
-    fit = None if nearest is None else settled(setup, nearest, SETTLED)
+    fit = None if nearest is None else converged(setup, nearest, CONVERGED)
     return fit if fit is not None and possible(fit) else None

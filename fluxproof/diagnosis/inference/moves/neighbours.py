@@ -3,9 +3,9 @@
 
 import itertools
 
+from fluxproof.diagnosis.inference.converge import around
 from fluxproof.diagnosis.inference.judged import MOST_EFFECTS, Judged, Names
 from fluxproof.diagnosis.inference.problem import Problem
-from fluxproof.diagnosis.inference.settle import around
 
 
 def neighbours(judged: Judged, best: Names):

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.inference.judged import SETTLED, Judged, Names
+from fluxproof.diagnosis.inference.judged import CONVERGED, Judged, Names
 
 
 def parts(judged: Judged, best: Names):
@@ -15,4 +15,4 @@ def parts(judged: Judged, best: Names):
         part = tuple(n for n in best if n != out)
         fit = judged.fits.get(part)
         if fit is not None and not fit.stands and (not fit.own or np.isfinite(fit.value)):
-            judged.linearise(part, SETTLED)
+            judged.linearise(part, CONVERGED)

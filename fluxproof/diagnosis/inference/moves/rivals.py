@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The best set that lacks an effect of the best one, on its own linearisation."""
 
-from fluxproof.diagnosis.inference.judged import SETTLED, Judged, Names
+from fluxproof.diagnosis.inference.judged import CONVERGED, Judged, Names
 
 RIVAL = 50.0  # log evidence below the best from which a set that does not stand may still reach it
 
@@ -11,4 +11,4 @@ def rivals(judged: Judged, best: Names):
     for out in best:
         for fit in judged.ranked(lambda f, out=out: out not in f.names)[:1]:
             if not fit.stands and fit.value > judged.best().value - RIVAL:
-                judged.linearise(fit.names, SETTLED)
+                judged.linearise(fit.names, CONVERGED)

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.inference.judged import SETTLED, Judged, Names
+from fluxproof.diagnosis.inference.judged import CONVERGED, Judged, Names
 
 
 def simpler(judged: Judged, best: Names):
@@ -15,4 +15,4 @@ def simpler(judged: Judged, best: Names):
     for size in range(1, len(best)):
         for fit in judged.ranked(lambda f, size=size: len(f.names) == size)[:1]:
             if not fit.own and np.isfinite(fit.value):
-                judged.linearise(fit.names, SETTLED)
+                judged.linearise(fit.names, CONVERGED)

@@ -3,9 +3,9 @@
 
 import numpy as np
 
+from fluxproof.diagnosis.inference.converge import around
 from fluxproof.diagnosis.inference.judged import Judged, Names
 from fluxproof.diagnosis.inference.moves.neighbours import near
-from fluxproof.diagnosis.inference.settle import around
 
 OTHERS = 3  # sets of measurement errors
 

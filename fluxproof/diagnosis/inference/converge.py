@@ -50,7 +50,7 @@ def _halfway(one, other):
     }
 
 
-def settled(setup, fit, steps) -> FittedSet | None:
+def converged(setup, fit, steps) -> FittedSet | None:
     """A set of effects on its own linearisation, or None; steps: at most so many.
 
     If steps stop shrinking (for example where a small current changes sign), every further step is halved.
@@ -79,4 +79,4 @@ def fit_at(setup, c) -> FittedSet | None:
 def fit_of_set(setup, names, steps=3) -> FittedSet:
     """A set of effects on its own linearisation, from the recording as it is."""
     fit = Problem(setup).fit(names)
-    return settled(setup, fit, steps) or fit
+    return converged(setup, fit, steps) or fit
