@@ -46,7 +46,7 @@ def test_import_direction():
         ("golden_model/fixed.py", "import fluxproof.plant.pmsm"),
         ("fluxproof/plant/pmsm.py", "import golden_model.fixed"),
         ("fluxproof/cosim/scenarios.py", "from fluxproof.diagnosis.inference import fit"),
-        ("fluxproof/diagnosis/inference/fit.py", "from scripts import generate"),
+        ("fluxproof/diagnosis/inference/least_squares.py", "from scripts import generate"),
         ("fluxproof/diagnosis/balance/misfit.py", "from fluxproof.diagnosis.catalogue import CATALOGUE"),
         ("studies/blind/forms.py", "from cocotb_tests.support import board"),
     ],

@@ -23,6 +23,7 @@ from fluxproof.diagnosis.ground.nominal import Nominal
 from fluxproof.diagnosis.ground.recording import Problem, Recording
 from fluxproof.diagnosis.inference.linearise import Rows
 from fluxproof.diagnosis.inference.posterior import Posterior
+from fluxproof.diagnosis.inference.search import search
 from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.interpret.judge import preferred
 from fluxproof.diagnosis.loading.restated import as_read
@@ -93,7 +94,7 @@ def _posterior(view, held, progress, shifts) -> Posterior:
     progress("sets of effects")
     setup = Setup.of(rows_of(view, held))
     setup.shifts = dict(shifts or {})
-    return Posterior(setup, progress)
+    return search(setup, progress)
 
 
 def _decision(recordings, nominal, progress, shifts) -> Decision:

@@ -8,9 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from fluxproof.diagnosis.effects.effect import FluxEffect
-from fluxproof.diagnosis.inference.posterior import possible
-from fluxproof.diagnosis.inference.problem import covariance_of
-from fluxproof.diagnosis.inference.settle import around, fit_of_set, settled
+from fluxproof.diagnosis.inference.converge import around, converged, fit_of_set
+from fluxproof.diagnosis.inference.fitted_set import covariance_of, possible
 from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.plant import FluxMap
 
@@ -55,7 +54,7 @@ def bounds(posterior) -> dict[str, dict]:
         if name in best.names:
             continue
         fit = problem.fit((*best.names, name))
-        fit = settled(posterior.setup, fit, len(best.names)) or fit
+        fit = converged(posterior.setup, fit, len(best.names)) or fit
         if not possible(fit):
             out[name] = {"refused": "its sign or size is impossible"}
             continue

@@ -15,7 +15,7 @@ from fluxproof.diagnosis.decide.rules import judge
 from fluxproof.diagnosis.ground import constants
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import RecordingError
-from fluxproof.diagnosis.inference.posterior import Posterior
+from fluxproof.diagnosis.inference.search import search
 from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.interpret.judge import preferred
 from fluxproof.diagnosis.loading.load import load_recording
@@ -25,7 +25,10 @@ from studies.sensitivity.steps import Steps, recorded, varied
 
 FACTORS = (0.5, 2.0)
 # Read at one operating point alone, which has no posterior.
-OF_ONE_POINT = ("LEFTOVER", "FLOOR_SHARE", "NAMED_SHARE", "PER_EFFECT")
+OF_ONE_POINT = (
+    *("LEFTOVER", "FLOOR_SHARE", "NAMED_SHARE", "PER_EFFECT", "LEAST_MEANS", "DRIFTS", "TIE", "SAME_COLUMN"),
+    *("CONSTANT_DC", "CONSTANT_U", "FITS"),
+)
 
 
 def names() -> list[str]:
@@ -76,7 +79,7 @@ class Case:
     def said(self) -> dict:
         """What is said now, as the diagnosis does (physics.py)."""
         steps = self.steps
-        posterior = steps(Posterior, steps(Setup.of, self.rows, steps))
+        posterior = steps(search, steps(Setup.of, self.rows, steps))
         j = steps(judge, posterior, self.held)
         plain = said(j.kind, j.names.named, j.names.ambiguous)
         if j.kind == "no_mismatch":

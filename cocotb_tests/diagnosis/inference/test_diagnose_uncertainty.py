@@ -13,8 +13,9 @@ from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import from_columns
-from fluxproof.diagnosis.inference.problem import Problem, covariance_of
-from fluxproof.diagnosis.inference.settle import fit_of_set
+from fluxproof.diagnosis.inference.converge import fit_of_set
+from fluxproof.diagnosis.inference.fitted_set import covariance_of
+from fluxproof.diagnosis.inference.problem import Problem
 from fluxproof.diagnosis.inference.setup import Setup
 
 NOMINAL = load_nominal(PAPER)

@@ -10,7 +10,7 @@ from cocotb_tests.support.recordings.slow_logs import LEVELS, NOMINAL, Truth, lo
 from fluxproof.diagnosis.balance.slow_view import slow_view
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.ground import constants
-from fluxproof.diagnosis.inference.posterior import possible
+from fluxproof.diagnosis.inference.fitted_set import possible
 from fluxproof.diagnosis.inference.problem import Problem
 from fluxproof.diagnosis.inference.setup import Setup
 

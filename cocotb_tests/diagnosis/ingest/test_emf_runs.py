@@ -13,8 +13,8 @@ from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.ground.recording import RecordingError, from_columns
+from fluxproof.diagnosis.inference.converge import fit_of_set
 from fluxproof.diagnosis.inference.problem import Problem
-from fluxproof.diagnosis.inference.settle import fit_of_set
 from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.ingest.emf import angle_of
 from fluxproof.diagnosis.loading.load import load_recording

@@ -11,7 +11,7 @@ from cocotb_tests.support.recordings.from_core import MACHINE, recorded
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.ground.nominal import load_nominal
-from fluxproof.diagnosis.inference.settle import fit_of_set
+from fluxproof.diagnosis.inference.converge import fit_of_set
 from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.plan.candidates import grid, new_axes, steady_view, within_limits
 from fluxproof.diagnosis.plan.experiment import ENOUGH, best_points, closest_distance, rivalry

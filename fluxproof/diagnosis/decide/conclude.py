@@ -13,7 +13,7 @@ from fluxproof.diagnosis.decide.rules import Judgement, judge
 from fluxproof.diagnosis.decide.sizes import Sizes, fit_of, left_by, measured_torque, with_stray
 from fluxproof.diagnosis.decide.unknown_term import sparse_term
 from fluxproof.diagnosis.ground.result import Fit, Remainder, UnknownTerm
-from fluxproof.diagnosis.inference.problem import covariance_of
+from fluxproof.diagnosis.inference.fitted_set import covariance_of
 
 MOST_RIVALS = 5
 MOST_POSSIBLE = 3  # possible effects that are reported as withheld

@@ -7,15 +7,12 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.balance.orders import at_order
-
-SMALL = (1e-3, 5e-3)  # of the bus and of the voltage: a smaller constant misfit may be ripple or resolution
-FITS = 3.0  # standard deviations within which a single effect explains the constant misfit
+from fluxproof.diagnosis.ground import constants as k
 
 
 def resolution(view) -> float:
     """Size of a constant misfit [V] that may be due to ripple or resolution."""
-    bus, level = SMALL
-    return bus * view.nominal.inverter.dc_bus_v + level * float(voltage_level(view).mean())
+    return k.CONSTANT_DC * view.nominal.inverter.dc_bus_v + k.CONSTANT_U * float(voltage_level(view).mean())
 
 
 def explaining(view, cells, effects, drifting, constant) -> list[str]:
@@ -31,7 +28,7 @@ def explaining(view, cells, effects, drifting, constant) -> list[str]:
             continue
         value = (np.conj(means[most]) * constant).real / abs(means[most]) ** 2
         c = {key: value if key == most else 0.0 for key in cores}
-        close = abs(constant - value * means[most]) < FITS * limit
+        close = abs(constant - value * means[most]) < k.FITS * limit
         if close and effect.possible(c, np.zeros((len(c),) * 2), view.nominal) and not effect.too_large(c, view):
             out.append(name)
     return sorted(out)

@@ -13,7 +13,7 @@ import numpy as np
 
 from fluxproof.diagnosis.ground.plant_section import in_addition
 from fluxproof.diagnosis.ground.result import Estimate, NamedEffect
-from fluxproof.diagnosis.inference.problem import covariance_of
+from fluxproof.diagnosis.inference.fitted_set import covariance_of
 
 
 def without_possible(names, best):

@@ -7,6 +7,7 @@ import numpy as np
 
 from fluxproof.diagnosis.decide.names import names_of
 from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.inference.search import within
 
 
 def without_idle(posterior, held):
@@ -20,7 +21,7 @@ def without_idle(posterior, held):
         idle = {n for n in asserted & set(posterior.best().names) if not helps(posterior, n, asserted, held)}
         if not idle:
             return posterior
-        posterior = posterior.within({n for _, fit in names.fits for n in fit.names} - idle, idle)
+        posterior = within(posterior, {n for _, fit in names.fits for n in fit.names} - idle, idle)
 
 
 def helps(posterior, name, asserted, held) -> bool:

@@ -6,9 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.balance.orders import at_order, harmonic, rms
+from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.result import Evidence, Location, OrderLine, Region
-
-REGION_FACTOR = 1.5  # least ratio of the misfit inside and outside of a reported region
 
 
 def _block_means(view):
@@ -54,7 +53,7 @@ def _regions(view, y0) -> tuple[Region, ...]:
                     ratio = np.sqrt(a.mean() / max(b.mean(), 1e-30))
                     if best is None or ratio > best[0]:
                         best = (ratio, x[good & side], a, b)
-        if best and best[0] > REGION_FACTOR:
+        if best and best[0] > k.REGION:
             _, inside, a, b = best
             out.append(
                 Region(

@@ -32,9 +32,7 @@ from fluxproof.diagnosis.inference.drift_fit import (
     row_sigmas,
     with_copper,
 )
-from fluxproof.diagnosis.inference.fit import Fitter
-
-LEAST_MEANS = 12  # over time; fewer do not determine a drift
+from fluxproof.diagnosis.inference.least_squares import Fitter
 
 
 def conclude_one_point(view) -> Decision:
@@ -42,7 +40,7 @@ def conclude_one_point(view) -> Decision:
     effects = view.visible(CATALOGUE)
     cells = cells_of(view, effects.values())
     raw = at_order(cells, cells.y, 0.0)
-    centred, long = centred_cells(cells), len(view) >= LEAST_MEANS and view.span_s > 0.0
+    centred, long = centred_cells(cells), len(view) >= k.LEAST_MEANS and view.span_s > 0.0
     drifting = [n for n, effect in effects.items() if long and drifts(cells, centred, n, effect)]
     sigma = row_sigmas(view, cells, raw)
     held = holdout_blocks(view) & long

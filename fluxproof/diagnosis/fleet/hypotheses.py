@@ -18,16 +18,15 @@ from fluxproof.diagnosis.decide.credibility import credibilities
 from fluxproof.diagnosis.decide.sizes import UNITS, Sizes, measured_torque
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.result import Remainder
-from fluxproof.diagnosis.inference.posterior import possible
-from fluxproof.diagnosis.inference.problem import covariance_of, log_too_small
-from fluxproof.diagnosis.inference.settle import around, settled
+from fluxproof.diagnosis.inference.converge import around
+from fluxproof.diagnosis.inference.fitted_set import FittedSet, covariance_of, log_too_small
+from fluxproof.diagnosis.inference.judged import CLOSE, Judged, Names
+from fluxproof.diagnosis.inference.search import until_it_stands
 
 BASE = tuple(name for name, effect in CATALOGUE.items() if effect.spreads)
-CLOSE = 20.0  # log evidence below the best within which a set is kept: e^-20 is no alternative at any rate
 KEPT = 8  # sets of a recording that go into its row
 OWN = 6  # sets that are judged on their own linearisation in a round
-ROUNDS = 4
-STEPS = 3  # linearisations of one set
+ROUNDS = 3
 UNKNOWN = 1e-6  # information, in units of the prior's, of a direction of which the data say nothing
 
 
@@ -60,103 +59,73 @@ class Hypothesis:
 
 def hypotheses(posterior) -> list[Hypothesis]:
     """The sets of extras that a recording leaves open, the best first."""
-    return _Search(posterior).found()
+    judged, out = _searched(posterior), []
+    for fit in _close(judged)[:KEPT]:
+        if np.isfinite(fit.value):
+            left, share = _left(judged.setup, fit)
+            extras = tuple(n for n in fit.names if n not in BASE)
+            out.append(Hypothesis(extras, fit.value, credibilities(fit), tuple(estimates(fit)), left, share))
+    return out
 
 
-class _Search:
-    """Sets of extras, first on the linearisation of the best one, then on their own."""
-
-    def __init__(self, posterior):
-        self.setup, best = posterior.setup, posterior.best()
-        problem = around(self.setup, best) or best.problem  # with the columns of every effect
-        able = problem.able()
-        self.base = tuple(n for n in BASE if n in able)
-        self.able = [n for n in able if n not in self.base]
-        self.fits, self.own = {}, set()
-        known = sorted(posterior.fits.values(), key=lambda f: -f.value)
-        first = {self._extras(f.names) for f in known if f.value > known[0].value - CLOSE}
-        self._add(problem, {(), *first, *((n,) for n in self.able)})
-        self._run()
-
-    def _extras(self, names) -> tuple[str, ...]:
-        return tuple(sorted(n for n in names if n not in self.base))
-
-    def _run(self):
-        seen = None
-        for _ in range(ROUNDS):
-            for extras in self._best(OWN):
-                self._linearise(extras)
-            best = self._best(1)[0]
-            if best == seen:
-                return
-            seen = best
-            near = {tuple(sorted({*best, n})) for n in self.able if n not in best}
-            near |= {tuple(n for n in best if n != out) for out in best}
-            self._add(self.fits[best].problem_of_all(self.setup), near)
-
-    def _best(self, count) -> list[tuple[str, ...]]:
-        ranked = sorted(self.fits, key=lambda e: (-self.fits[e].value, e))
-        top = self.fits[ranked[0]].value
-        return [e for e in ranked[:count] if self.fits[e].value > top - CLOSE]
-
-    def _add(self, problem, sets):
-        for extras in sorted(sets):
-            if extras not in self.own:
-                self.fits[extras] = _Judged(self._fit(problem, extras), self.base)
-
-    def _fit(self, problem, extras):
-        return problem.fit((*self.base, *extras))
-
-    def _linearise(self, extras):
-        if extras in self.own:
-            return
-        self.own.add(extras)
-        found = settled(self.setup, self.fits[extras].fit, STEPS)
-        if found is None:
-            self.fits[extras].value = -np.inf
-        else:
-            self.fits[extras] = _Judged(found, self.base)
-
-    def found(self) -> list[Hypothesis]:
-        out = []
-        for extras in self._best(KEPT):
-            judged = self.fits[extras]
-            if not np.isfinite(judged.value):
-                continue
-            credible = credibilities(judged.fit)
-            left, share = self._left(judged.fit)
-            out.append(Hypothesis(extras, judged.value, credible, tuple(estimates(judged.fit)), left, share))
-        return out
-
-    def _left(self, fit) -> tuple[tuple[Remainder, ...], float]:
-        """What a set leaves above the noise floor, and its share of what there is beside the spread of manufacture."""
-        setup = self.setup
-        every = np.ones(len(setup.view), bool)
-        sizes = Sizes(setup, fit.left(self.base), fit.left(), every, measured_torque(setup))
-        shares = [s.left / s.excess for s in sizes.channels.values() if s.after > s.above(k.FLOOR) and s.excess > 0.0]
-        parts = tuple(dataclasses.replace(part, order=self._signed(part, fit.left())) for part in sizes.remainder())
-        return parts, float(max(shares, default=0.0))
-
-    def _signed(self, part, after) -> float:
-        """The order with the sign of the direction that holds more of the remainder."""
-        cells = self.setup.cells
-        channel = next(c for c, (signal, _) in UNITS.items() if signal == part.signal)
-        mine = cells.ok & (cells.channel == channel) & (np.abs(np.abs(cells.order) - part.order) < 1e-3)
-        return -part.order if (np.sign(cells.order[mine]) @ after[mine] ** 2) < 0.0 else part.order
+def _searched(posterior) -> Judged:
+    """Sets of extras beside the spread of manufacture, ranked by the evidence for the extras."""
+    best = posterior.best()
+    problem = around(posterior.setup, best) or best.problem  # with the columns of every effect
+    judged, least = Judged(posterior.setup, worth=_evidence), best.value - CLOSE
+    base = {n for n in problem.able() if n in BASE}
+    known = [fit.names for fit in posterior.fits.values() if fit.value > least]
+    judged.judge(problem, sorted({_joined(base, extras) for extras in ((), *known, *((n,) for n in problem.able()))}))
+    leaders(judged, ())
+    until_it_stands(judged, (one_more_or_less, leaders), ROUNDS)
+    return judged
 
 
-class _Judged:
-    """A fit with the evidence for its extras."""
+def one_more_or_less(judged: Judged, best: Names):
+    """Judge the best set with another extra, and without one of its own, on its linearisation."""
+    fit = judged.fits[best]
+    problem = around(judged.setup, fit) or fit.problem
+    more = {_joined(best, (n,)) for n in problem.able()} - {best}
+    judged.judge(problem, sorted(more | {tuple(n for n in best if n != out) for out in best if out not in BASE}))
 
-    def __init__(self, fit, base):
-        self.fit = fit
-        odds = sum(fit.problem.setup.odds(n) for n in fit.names)
-        spread = log_too_small(fit, [n for n in fit.names if n in base])  # of manufacture, which may be small
-        self.value = float(fit.value - odds - spread) if possible(fit) else -np.inf
 
-    def problem_of_all(self, setup):
-        """The linearisation at this fit with the columns of every effect."""
-        return around(setup, self.fit) or self.fit.problem
+def leaders(judged: Judged, best: Names):
+    """Linearise the best sets."""
+    for fit in _close(judged)[:OWN]:
+        if not fit.own:
+            judged.linearise(fit.names)
+
+
+def _joined(names, others) -> Names:
+    return tuple(sorted({*names, *others}))
+
+
+def _close(judged) -> list[FittedSet]:
+    least = judged.best().value - CLOSE
+    return judged.ranked(lambda fit: fit.value > least)
+
+
+def _evidence(fit) -> float:
+    """Log evidence of a set without the odds of its extras; the spread of manufacture may be small."""
+    odds = sum(fit.problem.setup.odds(n) for n in fit.names)
+    return float(fit.value - odds - log_too_small(fit, [n for n in fit.names if n in BASE]))
+
+
+def _left(setup, fit) -> tuple[tuple[Remainder, ...], float]:
+    """What a set leaves above the noise floor, and its share of what there is beside the spread of manufacture."""
+    every = np.ones(len(setup.view), bool)
+    sizes = Sizes(setup, fit.left(BASE), fit.left(), every, measured_torque(setup))
+    shares = [s.left / s.excess for s in sizes.channels.values() if s.after > s.above(k.FLOOR) and s.excess > 0.0]
+    parts = tuple(dataclasses.replace(part, order=_signed(setup, part, fit.left())) for part in sizes.remainder())
+    return parts, float(max(shares, default=0.0))
+
+
+def _signed(setup, part, after) -> float:
+    """The order with the sign of the direction that holds more of the remainder."""
+    cells = setup.cells
+    channel = next(c for c, (signal, _) in UNITS.items() if signal == part.signal)
+    mine = cells.ok & (cells.channel == channel) & (np.abs(np.abs(cells.order) - part.order) < 1e-3)
+    return -part.order if (np.sign(cells.order[mine]) @ after[mine] ** 2) < 0.0 else part.order
 
 
 def estimates(fit) -> list[Estimated]:

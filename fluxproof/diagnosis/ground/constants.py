@@ -44,10 +44,18 @@ POINT = 0.08
 VISITS = 16
 # Largest power of a ripple that repeats at an operating point, relative to its variance, that counts as noise: 2 sigma.
 RIPPLE = 4.0
+# Misfit, relative to the voltage, above which an effect that is far from linear is approached from several starts: an
+# angle that is off by a third of a radian leaves as much.
+FAR = 0.3
 
 # ---- interpretation of recording and drive file
 # Prior probability of each mistaken convention (conventions/table.py): of 35, one recording in fourteen has one.
 MISREAD = 2e-3
+# Log evidence that any effect costs: prior odds of 1 to 19, and the width of its prior.  A convention that cannot gain
+# as much by leaving no effect is not searched.
+ONE_EFFECT = 7.0
+# Least number of operating points: at fewer some convention meets any constant misfit.
+READ_POINTS = 3
 
 # ---- what is reported
 # Largest probability of absence at which an effect, or one effect of an alternative, is still reported.
@@ -81,6 +89,15 @@ HALF = 0.5
 STANDS_OUT = 0.1
 # Share of the power of all orders of a channel below which an order is not listed in the remainder.
 LISTED = 0.01
+# Residual, in noise floors, that the headline reports although the misfit is explained.
+MUCH_LEFT = 3.0
+# Least ratio of the misfit inside and outside of a reported region of speed, current, temperature, bus or time.
+REGION = 1.5
+# Distance, in control periods and in standard deviations, within which a time counts as a whole number of periods, as
+# a wrong register of the timing makes it.
+WHOLE_PERIOD, WHOLE_SIGMAS = 0.01, 3.0
+# Share of an effect's longest column below which the recording does not show a coefficient, so that one is requested.
+SHOWN = 0.06
 
 # ---- a misfit outside the orders of the balance
 # Ripple that the formulas of the reported effects may leave, relative to the misfit's rms.
@@ -111,3 +128,14 @@ UNREPEATED = 0.03
 LEFTOVER, FLOOR_SHARE, NAMED_SHARE = 2.0, 0.15, 0.9
 # Penalty of an effect in chi^2, in addition to that of its coefficients: a prior probability of one in 150.
 PER_EFFECT = 10.0
+# Least number of means over time: fewer do not determine a drift.
+LEAST_MEANS = 12
+# Least change of a column over time, relative to its size, for its effect to drift.
+DRIFTS = 0.1
+# Difference of the score below which two sets of drifts fit equally well; 10 is a likelihood ratio of 150.
+TIE = 10.0
+# Cosine of two columns above which they are the same: then warming copper is no alternative.
+SAME_COLUMN = 0.999
+# Constant misfit, relative to the bus and to the voltage, that may be ripple or resolution; multiple of it within which
+# a single effect explains the constant misfit.
+CONSTANT_DC, CONSTANT_U, FITS = 1e-3, 5e-3, 3.0

@@ -13,14 +13,10 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.balance.orders import at_order
+from fluxproof.diagnosis.catalogue.resistance_temperature import COPPER
 from fluxproof.diagnosis.ground import constants
 from fluxproof.diagnosis.ground.arrays import Complex
-from fluxproof.diagnosis.inference.fit import Fitter, Model
-
-DRIFTS = 0.1  # least change of a column over time relative to its size
-TIE = 10.0  # difference of the score below which two sets of effects fit equally well
-COPPER = 0.0039  # 1/K
-SAME_COLUMN = 0.999  # cosine
+from fluxproof.diagnosis.inference.least_squares import Fitter, Model
 
 
 def centred_cells(cells):
@@ -44,7 +40,7 @@ def drifts(cells, centred, name, effect) -> bool:
     rows = (cells.channel == "u") & (cells.order == 0)
     cores = [k for k in cells.columns[name] if not k.startswith("~")]
     size = lambda c, k: float(np.linalg.norm(c.columns[name][k][rows]))  # noqa: E731
-    return not effect.corrects and any(size(centred, k) > DRIFTS * max(size(cells, k), 1e-30) for k in cores)
+    return not effect.corrects and any(size(centred, k) > constants.DRIFTS * max(size(cells, k), 1e-30) for k in cores)
 
 
 def row_sigmas(view, cells, raw: Complex):
@@ -76,7 +72,7 @@ def best_sets(fitter, effects, drifting, view):
         s.score += s.chi2 / spread - s.chi2
     solved.sort(key=lambda s: s.score)
     best = solved[0]
-    return best, [s for s in solved[1:] if s.score < best.score + TIE and s.model.names != best.model.names]
+    return best, [s for s in solved[1:] if s.score < best.score + constants.TIE and s.model.names != best.model.names]
 
 
 def fuller(fitter, best, effects, drifting, view) -> list:
@@ -98,7 +94,10 @@ def with_copper(fitter, best, cells, view) -> list:
     rows = (cells.channel == "u") & (cells.order == 0)
     copper = drop[cells.block[rows], cells.part[rows]]
     own = [c[rows] for n in best.model.names for c in fitter.cells.columns[n].values()]
-    if any(np.linalg.norm(c) and c @ copper > SAME_COLUMN * np.linalg.norm(c) * np.linalg.norm(copper) for c in own):
+    if any(
+        np.linalg.norm(c) and c @ copper > constants.SAME_COLUMN * np.linalg.norm(c) * np.linalg.norm(copper)
+        for c in own
+    ):
         return []
     y = fitter.cells.y.copy()
     y[rows] -= copper

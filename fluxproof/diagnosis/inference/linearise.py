@@ -19,7 +19,7 @@ from fluxproof.diagnosis.balance.shaft import MEASURED
 from fluxproof.diagnosis.balance.view import View
 from fluxproof.diagnosis.effects.corrections import in_turn, with_flux
 from fluxproof.diagnosis.effects.effect import rated_torque
-from fluxproof.diagnosis.inference.fit import Fitter, everything
+from fluxproof.diagnosis.inference.least_squares import Fitter, everything
 
 
 def at_once(step, *arguments):

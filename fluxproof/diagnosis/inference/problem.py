@@ -9,12 +9,13 @@ back to first order, so that the same problem serves every set.
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import believable
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
+from fluxproof.diagnosis.inference.fitted_set import FittedSet, implausible, log_too_small
 from fluxproof.diagnosis.inference.linearise import Linearisation
 from fluxproof.diagnosis.inference.model import Columns
 from fluxproof.diagnosis.inference.points import condense
@@ -125,8 +126,8 @@ class Problem:
         own = slice(len(take))
         return take, best.log_evidence, best.c[own], best.covariance[own, own], best.sizes[:-1], best.lam, best.mu
 
-    def fit(self, names):
-        """The Fit of a set of effects on this problem."""
+    def fit(self, names) -> FittedSet:
+        """The fit of a set of effects on this problem."""
         names = tuple(sorted(names))
         take, value, c, cov, a, lam, mu = self.setup.call(Problem.likelihood, self, names)
         # Prior odds of every effect, and the prior of its size: even in the logarithm up to a typical size, the
@@ -138,69 +139,6 @@ class Problem:
             - np.log1p(x**2 / self.most[n])
             for n, x in zip(names, a, strict=True)
         )
-        found = Fit(self, names, float(value), take, c, cov, a, lam, mu)
-        found.value += np.log(k.IMPLAUSIBLE) * implausible(found) + log_too_small(found, names)
-        return found
-
-
-class Fit:
-    """A set of effects on a problem; stands: whether the problem is linearised at it."""
-
-    stands = False
-
-    def __init__(self, problem, names, value, take, c, cov, sizes, lam, mu):
-        self.problem, self.names, self.value = problem, names, value
-        self.take, self.vector, self.cov, self.sizes, self.lam, self.mu = take, c, cov, sizes, lam, mu
-        self.c, self.places = {name: {} for name in names}, {name: [] for name in names}
-        for place, (n, v) in enumerate(zip(take, c, strict=True)):
-            name, key = problem.keys[n]
-            self.c[name][key.lstrip("~")] = float(v)
-            self.places[name].append(place)  # of the effect's coefficients in the set's
-        for name in names:
-            for key in problem.coefficients[name]:
-                self.c[name].setdefault(key, 0.0)
-
-    @property
-    def variance(self) -> np.ndarray:
-        """(n,) of means and contrasts: noise, discrepancy and errors of the curves."""
-        p = self.problem.p
-        return p.s2 + (self.lam[p.group] * p.level) ** 2 + (self.mu[p.group] * p.doubt) ** 2
-
-    def left(self, names=None):
-        """(r,) remainder of the misfit if the effects ``names`` (None: all of the set) explain their part."""
-        out = self.problem.y.copy()
-        for n, v in zip(self.take, self.vector, strict=True):
-            owner, key = self.problem.keys[n]
-            if names is None or owner in names:
-                out -= v * self.problem.cells.columns[owner][key]
-        return out
-
-
-def covariance_of(fit, name, full) -> np.ndarray:
-    """The covariance of one effect's coefficients in their order in ``fit.c``; full: (k, k) of the set's columns."""
-    out = np.zeros((len(fit.c[name]),) * 2)
-    mine = fit.places[name]  # next to each other; what was estimated comes first in fit.c
-    if mine:
-        own = slice(mine[0], mine[-1] + 1)
-        out[: len(mine), : len(mine)] = full[own, own]
-    return out
-
-
-def implausible(fit) -> int:
-    """Number of the parameters of a set that are outside of what their effects declare as plausible."""
-    return sum(_implausible(fit, name) for name in fit.names)
-
-
-def log_too_small(fit, names) -> float:
-    """Log prior of the effects ``names`` of a set as far as they are smaller than what is of practical interest."""
-    effects, nominal = fit.problem.setup.effects, fit.problem.view.nominal
-    sizes = [max(effects[n].size(fit.c[n], nominal) / effects[n].floor(nominal), 1e-30) for n in names]
-    return k.SMALLER * sum(min(float(np.log(size)), 0.0) for size in sizes)
-
-
-def _implausible(fit, name) -> int:
-    effect, nominal = fit.problem.setup.effects[name], fit.problem.view.nominal
-    if not effect.plausible:
-        return 0
-    found = effect.estimates(fit.c[name], covariance_of(fit, name, fit.cov), nominal)
-    return sum(not believable(found[key], limits, nominal) for key, limits in effect.plausible.items() if key in found)
+        found = FittedSet(self, names, float(value), take, c, cov, a, lam, mu)
+        judged = float(value) + np.log(k.IMPLAUSIBLE) * implausible(found) + log_too_small(found, names)
+        return replace(found, value=judged)

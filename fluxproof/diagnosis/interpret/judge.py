@@ -24,17 +24,16 @@ from fluxproof.diagnosis.decide.interpretation import is_exact, is_simpler
 from fluxproof.diagnosis.effects.effect import torque_of
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
+from fluxproof.diagnosis.inference.fitted_set import implausible
 from fluxproof.diagnosis.inference.linearise import Rows
 from fluxproof.diagnosis.inference.model import no_columns
 from fluxproof.diagnosis.inference.points import condense
-from fluxproof.diagnosis.inference.posterior import Posterior
-from fluxproof.diagnosis.inference.problem import Problem, implausible
+from fluxproof.diagnosis.inference.problem import Problem
+from fluxproof.diagnosis.inference.search import search
 from fluxproof.diagnosis.inference.setup import Setup
 
 WIDE = 6  # readings to which a second one is added
 SEARCHED = 2  # readings, or pairs of them, that are judged with the whole search
-ONE_EFFECT = 7.0  # log evidence that any effect costs: prior odds of 1 to 19, and the width of its prior
-LEAST_POINTS = 3  # operating points: at fewer some reading meets any constant misfit
 SAME = 1e-6  # of the balance: readings that leave the same
 KEYS = ("resistance_ohm", "inductance_d_h", "inductance_q_h", "magnet_flux_wb")
 
@@ -56,7 +55,7 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
     misfit.
     """
     setup, known = posterior.setup, posterior.best().value
-    if len(np.unique(setup.points)) < LEAST_POINTS:
+    if len(np.unique(setup.points)) < k.READ_POINTS:
         return (), [], posterior
     most = len(posterior.best().names) if explained else np.inf
     absurd = implausible(posterior.best()) > 0  # a bus sensor that is off by a third, say
@@ -73,11 +72,11 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
     best, found = None, posterior
     for j in ranked[:SEARCHED]:
         prior = len(j.readings) * np.log(k.MISREAD)
-        if max(j.value, perfect - ONE_EFFECT + prior) <= known:
+        if max(j.value, perfect - k.ONE_EFFECT + prior) <= known:
             continue
         progress(f"interpretation: {j.readings[0].says}")
         read = setup.call(_read, setup, tuple(r.code for r in j.readings))
-        other = setup.call(Posterior, read, progress)
+        other = setup.call(search, read, progress)
         value = other.best().value + prior + terms.jacobian(j.readings)
         left = other.best().names
         met = is_exact(j.readings, left, setup.effects) and is_simpler(j.readings, left, most, absurd)

@@ -17,7 +17,6 @@ from fluxproof.diagnosis.plan.candidates import grid, new_axes, steady_view, wit
 from fluxproof.diagnosis.plan.experiment import BENDS, best_points, rivalry
 from fluxproof.diagnosis.plan.planned import Difference, Planned
 
-SHOWN = 0.06  # share of an effect's longest column below which the recording does not show a coefficient
 BLOCKS = 20  # independent blocks assumed in a dwell of half a second
 MOST_REQUESTS = 3
 # Share of D^2 that is given up to avoid an axis without current so far, whose parameters are unknown, and to avoid
@@ -49,7 +48,7 @@ def known_of(fit, columns) -> np.ndarray:
         mine = [key for key in columns if key[0] == key_a[0]]
         seen = {key: length[place[key]] for key in mine if key in place and length[place[key]] > 1e-9}
         # Within the recorded range at most as large as the effect itself; beyond it a curve over speed may be larger.
-        shown = seen.get(key_a, 0.0) > SHOWN * max(seen.values(), default=0.0)
+        shown = seen.get(key_a, 0.0) > constants.SHOWN * max(seen.values(), default=0.0)
         size = seen if shown else {key: np.linalg.norm(columns[key]) for key in mine}
         own = sum(abs(c[n].get(key, 0.0)) * size[n, key] for n, key in size)
         out[a, a] += (size[key_a] / (BENDS * own + 1e-12 * size[key_a] + 1e-30)) ** 2
@@ -68,7 +67,7 @@ def determined(fit) -> dict:
     length = np.linalg.norm(problem.p.x / np.sqrt(fit.variance)[:, None], axis=0)
     for n, c in out.items():
         mine = {key: length[j] for j, (name, key) in enumerate(problem.keys) if name == n}
-        least = SHOWN * max(mine.values(), default=0.0)
+        least = constants.SHOWN * max(mine.values(), default=0.0)
         for key in [k for k, size in mine.items() if k.startswith("~") and size <= least]:
             c.pop(key.lstrip("~"), None)
     return out

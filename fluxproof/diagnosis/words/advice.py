@@ -7,11 +7,11 @@ import re
 
 import numpy as np
 
+from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.quantities import RPM, decimals, fixed
 from fluxproof.diagnosis.words.phrases import CORRECTED, SIGNALS, capital, corrected, joined
 
 MOST_TITLES = 4
-WHOLE, SIGMAS = 0.01, 3.0  # of a control period, and standard deviations: nearer times are a whole number of periods
 NEAR = 0.05  # of an order: closer ones are the same
 VARIABLES = {"omega": "the speed", "omega_e": "the speed", "i_d": "i_d", "i_q": "i_q", "i": "the current", "t": "time",
              "u_dc": "the bus voltage", "temp_winding": "the winding's temperature"}  # fmt: skip
@@ -90,7 +90,7 @@ def _periods(answer, nominal, effects) -> list[str]:
             if e is None or not p.periods:
                 continue
             n = round(e.value / period)
-            if n and abs(e.value - n * period) <= max(SIGMAS * e.sigma, WHOLE * period):
+            if n and abs(e.value - n * period) <= max(k.WHOLE_SIGMAS * e.sigma, k.WHOLE_PERIOD * period):
                 many = "one sample" if abs(n) == 1 else f"{abs(n)} samples"
                 now = getattr(nominal.control, p.periods)
                 out.append(f"{capital(p.negative if n < 0 else p.called)} {many}: "

@@ -3,10 +3,9 @@
 
 from __future__ import annotations
 
+from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.quantities import ascii_of, quantity
 from fluxproof.diagnosis.words.phrases import CORRECTED, as_if, capital, part_text, percent_below, said
-
-MUCH_LEFT = 3.0  # times the noise floor: a larger residual is reported although the misfit is explained
 
 
 def details(answer, sentence, effects) -> str:
@@ -24,7 +23,7 @@ def details(answer, sentence, effects) -> str:
         fall = both if found and fit.holdout_after < fit.holdout_before else f"is {volts(fit.holdout_before)}"
         floor = f"the noise floor is {volts(fit.noise_floor)}"
         parts.append(f"The misfit at held-out operating points {fall}; {floor}.")
-        if answer.verdict == "explained" and fit.holdout_after > MUCH_LEFT * fit.noise_floor:
+        if answer.verdict == "explained" and fit.holdout_after > k.MUCH_LEFT * fit.noise_floor:
             times = f"{fit.holdout_after / fit.noise_floor:.2g} times the noise floor"
             why = "a formula is inexact for this drive, or a small effect is missing"
             parts.append(f"The remaining residual is {times}: {why}.")

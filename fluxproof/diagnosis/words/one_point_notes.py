@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.decide.decision import OnePoint
-from fluxproof.diagnosis.decide.one_point import LEAST_MEANS
+from fluxproof.diagnosis.ground import constants as k
 
 
 def one_point_notes(view, found: OnePoint, held) -> list[str]:
@@ -17,7 +17,7 @@ def one_point_notes(view, found: OnePoint, held) -> list[str]:
         f"{point} in {len(view)} means over {view.span_s:.4g} s, {int(held.sum())} of them held out: only changes "
         "over time can be diagnosed."
         if found.long
-        else f"{point} with {len(view)} steady stretches; at least {LEAST_MEANS} with time stamps are needed to "
+        else f"{point} with {len(view)} steady stretches; at least {k.LEAST_MEANS} with time stamps are needed to "
         "detect a drift."
     ]
     if np.isfinite(view.temp).all():

@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from fluxproof.diagnosis.inference.fitted_set import FittedSet
 from fluxproof.diagnosis.inference.linearise import frozen, linearised
-from fluxproof.diagnosis.inference.problem import Fit, Problem
+from fluxproof.diagnosis.inference.problem import Problem
 
 STANDS = 0.1  # standard deviations: a smaller change of every coefficient ends the iteration
 SHRINKS = 0.7  # of the last step: from a longer one on, all are damped
@@ -47,7 +50,7 @@ def _halfway(one, other):
     }
 
 
-def settled(setup, fit, steps) -> Fit | None:
+def converged(setup, fit, steps) -> FittedSet | None:
     """A set of effects on its own linearisation, or None; steps: at most so many.
 
     If steps stop shrinking (for example where a small current changes sign), every further step is halved.
@@ -60,21 +63,20 @@ def settled(setup, fit, steps) -> Fit | None:
         new = problem.fit(fit.names)
         step = moved(new, fit)
         if step < STANDS:
-            new.stands = True
-            return new
+            return replace(new, stands=True)
         damped |= SHRINKS * last < step < np.inf
         at = _halfway(at, new.c) if damped else new.c
         fit, last = new, step
     return fit
 
 
-def fit_at(setup, c) -> Fit | None:
+def fit_at(setup, c) -> FittedSet | None:
     """A set of effects on the linearisation at its coefficients c, or None."""
     problem = _at(setup, c, tuple(c))
     return None if problem is None else problem.fit(tuple(c))
 
 
-def fit_of_set(setup, names, steps=3) -> Fit:
+def fit_of_set(setup, names, steps=3) -> FittedSet:
     """A set of effects on its own linearisation, from the recording as it is."""
     fit = Problem(setup).fit(names)
-    return settled(setup, fit, steps) or fit
+    return converged(setup, fit, steps) or fit
