@@ -1,11 +1,34 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Clarke and Park transforms, amplitude invariant, alpha on phase a."""
+"""Clarke's transform, amplitude invariant, alpha on phase a: of numbers in kernels, and of arrays as space vectors.
+
+A space vector is complex, alpha + j beta in the stator frame; times e^(-j theta) it is d + j q (Park).
+"""
 
 import math
+
+import numpy as np
 
 from fluxproof.plant.jit import njit
 
 SQRT3 = math.sqrt(3.0)
+AXES = np.exp(2j * np.pi / 3 * np.arange(3))  # directions of the phases a, b, c in the stator frame
+# Phase values of a unit of alpha or beta over 3/2: patterns of three deviations whose sum is zero.
+PATTERNS = {"alpha": (2 / 3, -1 / 3, -1 / 3), "beta": (0.0, 3**-0.5, -(3**-0.5))}
+
+
+def space_vector(abc):
+    """Space vectors (...) of phase values (..., 3); the zero sequence cancels."""
+    return (2 / 3) * (abc @ AXES)
+
+
+def phase_values(vector):
+    """Phase values (..., 3), of zero sum, of space vectors (...)."""
+    return (vector[..., None] * np.conj(AXES)).real
+
+
+def linear_limit(u_dc):
+    """Longest voltage vector [V] in any direction that a bus voltage [V] gives without overmodulation."""
+    return u_dc / SQRT3
 
 
 @njit

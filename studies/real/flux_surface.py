@@ -23,6 +23,7 @@ from scipy.spatial import Delaunay, cKDTree
 
 from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.ground.machine import flux_linkage
 from fluxproof.diagnosis.ground.result import Estimate
 from fluxproof.plant import FluxMap
 from studies.real.flux_splines import emf_columns, gradients, knots_over, powers
@@ -65,8 +66,8 @@ class Surface:
 
     def psi(self, i) -> np.ndarray:
         """Flux linkage including the magnet, complex [Wb], at dq currents of any shape, complex [A]."""
-        m, i = self.machine, np.asarray(i)
-        return m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag + self.surplus(i)
+        i = np.asarray(i)
+        return flux_linkage(self.machine, i) + self.surplus(i)
 
     def covered(self, i) -> np.ndarray:
         """Whether dq currents (any shape) lie between neighbouring recorded operating points, bool."""

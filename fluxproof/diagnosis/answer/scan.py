@@ -15,8 +15,8 @@ import numpy as np
 from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.balance.quantised_angle import beat_ripple, beat_spectrum
-from fluxproof.diagnosis.effects.effect import rated_torque
 from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.machine import rated_torque
 
 MOST_ORDER = 80  # per mechanical turn; of a machine with many pole pairs those up to
 MOST_ELECTRICAL = 12  # per electrical turn
@@ -65,7 +65,7 @@ def stray_torque(view, projector, cells, residual, sigma) -> Stray | None:
     if use.sum() < 12:
         return None
     m, best = view.machine, None
-    rated = rated_torque(view.nominal)
+    rated = rated_torque(view.machine)
     for n in range(1, 5):
         angle = n * view.theta_mid / m.pole_pairs
         waves = [projector.rows({"torque": f(angle)})[use] / sigma[use] for f in (np.cos, np.sin)]

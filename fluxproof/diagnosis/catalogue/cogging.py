@@ -4,7 +4,8 @@
 import numpy as np
 
 from fluxproof.diagnosis.balance.torque_order import log_prior, repeating_order
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, rated_torque
+from fluxproof.diagnosis.effects.effect import Effect, Parameter
+from fluxproof.diagnosis.ground.machine import rated_torque
 from fluxproof.diagnosis.ground.result import Estimate
 
 
@@ -42,10 +43,10 @@ class Cogging(Effect):
         return log_prior(view)
 
     def floor(self, nominal):
-        return 0.006 * rated_torque(nominal)
+        return 0.006 * rated_torque(nominal.machine)
 
     def ceiling(self, nominal):
-        return 0.6 * rated_torque(nominal)
+        return 0.6 * rated_torque(nominal.machine)
 
     def size(self, c, nominal):
         return float(np.sqrt(sum(v**2 for v in c.values())))

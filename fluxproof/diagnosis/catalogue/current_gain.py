@@ -5,6 +5,7 @@ import numpy as np
 
 from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, current_error, phase_error, sigma
 from fluxproof.diagnosis.ground.result import Estimate
+from fluxproof.plant.transforms import PATTERNS
 
 # Gains of two sensors that differ by g cause a harmonic of 0.58 g and a rotation of 0.29 g; twice that is allowed.
 MOST_TURN = 1 / 3
@@ -12,7 +13,6 @@ MOST_TURN = 1 / 3
 # the coefficients by which they may differ from that, and of its rotation, which three sensors do not have.
 PAIR = {"alpha": 1.5, "beta": -(0.75**0.5), "turn": 12**-0.5}
 UNLIKE_PAIR, TURNED = 0.2, 0.5
-PATTERNS = {"alpha": (2 / 3, -1 / 3, -1 / 3), "beta": (0.0, 3**-0.5, -(3**-0.5))}
 
 
 def gain_column(view, weights):

@@ -7,6 +7,7 @@ The loss current may also lag by a time, as eddy currents do, and then weakens t
 import numpy as np
 
 from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, one, sigma, torque_of
+from fluxproof.plant.transforms import linear_limit
 
 LAG_S = 1e-4  # time in which eddy currents build up in a lamination of 0.3 mm
 
@@ -71,7 +72,7 @@ class IronLoss(Effect):
 
     @staticmethod
     def _rated_emf(nominal):
-        return nominal.inverter.dc_bus_v / np.sqrt(3)
+        return linear_limit(nominal.inverter.dc_bus_v)
 
     @staticmethod
     def _conductance(c):

@@ -4,10 +4,10 @@
 import numpy as np
 
 from fluxproof.diagnosis.balance.curves import course
-from fluxproof.diagnosis.catalogue.current_gain import PATTERNS
 from fluxproof.diagnosis.catalogue.resistance import to_true_resistance
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, voltage
 from fluxproof.diagnosis.ground.result import Estimate
+from fluxproof.plant.transforms import PATTERNS
 
 
 class PhaseResistanceAsymmetry(Effect):

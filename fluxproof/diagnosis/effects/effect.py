@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.machine import airgap_torque, slope_in_zero_vector
 from fluxproof.diagnosis.ground.result import Estimate
 
 Column = dict  # channel -> array
@@ -250,21 +251,13 @@ def angle_error(view, delta) -> Column:
 
 def zero_vector_slope(view):
     """Slope of the measured current in the zero vector, in dq at the angle of the valley, (b, m+1) [A/s]."""
-    m = view.machine
-    emf = -m.resistance_ohm * view.i - 1j * view.omega * view.psi
-    return emf.real / m.inductance_d_h + 1j * emf.imag / m.inductance_q_h + 1j * view.omega * view.i
+    return slope_in_zero_vector(view.machine, view.i, view.omega, view.psi)
 
 
 def torque_of(view, psi, i):
     """Air-gap torque of the intervals, (b, m) [Nm], from flux linkage and current at the samples."""
-    torque = 1.5 * view.machine.pole_pairs * (np.conj(psi) * i).imag
+    torque = airgap_torque(view.machine, psi, i)
     return 0.5 * (torque[:, 1:] + torque[:, :-1])
-
-
-def rated_torque(nominal) -> float:
-    """Magnet torque at rated current [Nm]."""
-    m = nominal.machine
-    return 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
 
 
 def sigma(covariance, k=0) -> float:

@@ -18,7 +18,7 @@ from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.balance.shaft import MEASURED
 from fluxproof.diagnosis.balance.view import View
 from fluxproof.diagnosis.effects.corrections import in_turn, with_flux
-from fluxproof.diagnosis.effects.effect import rated_torque
+from fluxproof.diagnosis.ground.machine import rated_torque
 from fluxproof.diagnosis.inference.fit import Fitter, everything
 
 
@@ -34,7 +34,7 @@ class Rows:
         self.view, self.effects = view, dict(effects)
         self.projector = Projector(view, loads=True)
         measured = bool(np.isin(view.shaft, MEASURED).all())
-        self.load = 0.0 if measured else rated_torque(view.nominal)
+        self.load = 0.0 if measured else rated_torque(view.machine)
         self.train = train_blocks[self.projector.block]
         self.cells = cells_of(view, self.effects.values(), self.projector)
         plain = noise(view, self.cells, self.cells.y)

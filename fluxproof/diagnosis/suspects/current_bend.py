@@ -3,9 +3,9 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.catalogue.current_gain import PATTERNS
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, phase_error
 from fluxproof.diagnosis.ground.result import Estimate
+from fluxproof.plant.transforms import PATTERNS
 
 PHASES = {**PATTERNS, "common": (1.0, 1.0, 1.0)}
 

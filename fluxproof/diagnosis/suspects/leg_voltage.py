@@ -3,11 +3,11 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.catalogue.current_offset import PATTERNS
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, voltage
 from fluxproof.diagnosis.ground.result import Estimate
+from fluxproof.plant.transforms import PATTERNS
 
-LEGS = {name: np.array(weights) for name, weights in PATTERNS.items() if name != "zero"}
+LEGS = {name: np.array(weights) for name, weights in PATTERNS.items()}
 
 
 class LegVoltage(Effect):

@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """An angle sensor that turns against the rotor with the torque, as behind a soft shaft or coupling."""
 
-import numpy as np
-
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, angle_error, one, rated_torque, sigma
+from fluxproof.diagnosis.effects.effect import Effect, Parameter, angle_error, one, sigma
+from fluxproof.diagnosis.ground.machine import airgap_torque, rated_torque
 
 SETTLED = 4  # steps until turn and torque agree
 
 
 def _load(view):
     """Air-gap torque at the samples over the rated one, (b, m+1)."""
-    return 1.5 * view.machine.pole_pairs * (np.conj(view.psi) * view.i).imag / rated_torque(view.nominal)
+    return airgap_torque(view.machine, view.psi, view.i) / rated_torque(view.machine)
 
 
 class ShaftTwist(Effect):

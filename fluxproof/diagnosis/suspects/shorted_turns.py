@@ -4,14 +4,15 @@
 import numpy as np
 
 from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, sigma
+from fluxproof.plant.transforms import AXES, linear_limit
 
-PHASES = {"a": 0.0, "b": 2.0 * np.pi / 3.0, "c": -2.0 * np.pi / 3.0}
+PHASES = "abc"
 LAG_S = 1e-4  # time in which the current of the short follows its EMF, L / R of the shorted turns
 
 
 def _short(view, phase):
     """{"": column of the resistive current, "_lag": of its lag} of one phase, per siemens referred to the phase."""
-    axis = np.exp(1j * (PHASES[phase] - view.theta))
+    axis = AXES[PHASES.index(phase)] * np.conj(view.turn)
     columns = {}
     for name, turned in {"": 1.0, "_lag": -1j * view.omega * LAG_S}.items():
         emf = (1j * view.omega * turned * view.psi * np.conj(axis)).real
@@ -36,7 +37,7 @@ class ShortedTurns(Effect):
 
     @staticmethod
     def _rated_emf(nominal):
-        return nominal.inverter.dc_bus_v / np.sqrt(3)
+        return linear_limit(nominal.inverter.dc_bus_v)
 
     def possible(self, c, covariance, nominal):
         """A short consumes power."""

@@ -4,12 +4,14 @@
 import numpy as np
 
 from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, current_error, one, sigma, voltage
+from fluxproof.diagnosis.ground.machine import steady_voltage
+from fluxproof.plant.transforms import linear_limit
 
 CHOKE = 0.02  # of the machine's inductance and resistance: those of the choke of a filter that is just of interest
 
 
 def _rated_voltage(nominal):
-    return nominal.inverter.dc_bus_v / np.sqrt(3)
+    return linear_limit(nominal.inverter.dc_bus_v)
 
 
 def _rated_speed(nominal):
@@ -20,7 +22,7 @@ def _rated_speed(nominal):
 
 class SineFilter(Effect):
     def core(self, view):
-        slope = 1j * view.omega * (view.machine.resistance_ohm * view.i + 1j * view.omega * view.psi)
+        slope = 1j * view.omega * steady_voltage(view.machine, view.i, view.omega, view.psi)
         return {"capacitance": current_error(view, slope)}
 
     def free(self, view):
