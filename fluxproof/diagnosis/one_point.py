@@ -19,6 +19,7 @@ from fluxproof.diagnosis.balance.cells import cells_of, voltage_level
 from fluxproof.diagnosis.balance.holdout import holdout_blocks
 from fluxproof.diagnosis.balance.orders import at_order
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.effects.course import moved
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.result import Diagnosis, Fit, NamedEffect, Remainder, Request
 from fluxproof.diagnosis.inference.drift_fit import (
@@ -87,7 +88,7 @@ def diagnose_one_point(view) -> Diagnosis:
 
 def _sorted_out(best, tied, effects, view):
     """(names, ambiguity sets): what all tied sets share is named."""
-    large = lambda s: {n for n in s.model.names if effects[n].moved(s.c[n], view) >= effects[n].floor(view.nominal)}  # noqa: E731
+    large = lambda s: {n for n in s.model.names if moved(effects[n], s.c[n], view) >= effects[n].floor(view.nominal)}  # noqa: E731
     sets = [large(s) for s in (best, *tied) if len(s.model) <= max(len(best.model), 1)]
     common, seen = set.intersection(*sets), set.union(*sets)
     rest = sorted(seen - common)
@@ -125,7 +126,7 @@ def _explaining(view, cells, effects, drifting, constant) -> list[str]:
     """Effects that do not drift and explain the constant misfit alone, with a size that a drive can have."""
     out, limit = [], _resolution(view)
     for name, effect in effects.items():
-        cores = {key: v for key, v in cells.columns[name].items() if not key.startswith("~")}
+        cores = {key: v for key, v in cells.columns[name].items() if (name, key) not in cells.free}
         if name in drifting or not cores:
             continue
         means = {key: complex(np.nanmean(at_order(cells, v, 0.0))) for key, v in cores.items()}

@@ -38,6 +38,11 @@ SHAPES = (
     "separable",
     "full",
 )  # inductances and magnet flux; a separate curve per axis; any reciprocal surface
+SHAPES_OF = {  # {effect: shapes of a map without it and with it}
+    "saturation": ("linear", "separable"),
+    "cross_saturation": ("separable", "full"),
+}
+BESIDE = ("dead_time", "resistance")  # functions of the current that are no flux: fitted together with a map
 
 
 @dataclass
@@ -120,8 +125,7 @@ def ladder(view, train, beside=None) -> dict[str, dict]:
 def names(steps: dict[str, dict], noise_v: float) -> list[str]:
     """Names that follow from a ladder: each step must predict BETTER times better and by more than the noise."""
     found = []
-    maps = sorted((e for e in CATALOGUE.values() if e.map_shapes), key=lambda e: SHAPES.index(e.map_shapes[1]))
-    for name, (before, after) in ((e.name, e.map_shapes) for e in maps):
+    for name, (before, after) in SHAPES_OF.items():
         worse, better = steps[before]["holdout"], steps[after]["holdout"]
         if worse > BETTER * better and worse**2 - better**2 > noise_v**2:
             found.append(name)
@@ -239,7 +243,7 @@ class _Problem:
 
 def _beside(names) -> tuple[str, ...]:
     """Effects that are fitted together with a map; by default the functions of the current that are no flux."""
-    return tuple(n for n, e in CATALOGUE.items() if e.beside_map) if names is None else tuple(names)
+    return BESIDE if names is None else tuple(names)
 
 
 def _basis(shape, knots_d, knots_q):

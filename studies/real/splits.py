@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import FluxEffect
+from fluxproof.diagnosis.effects import FluxEffect
 from fluxproof.diagnosis.ground.machine import flux_linkage
 from fluxproof.diagnosis.inference.posterior import possible
 from fluxproof.diagnosis.inference.problem import covariance_of

@@ -17,12 +17,17 @@ from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.cells import cells_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.command import answer_lines
+from fluxproof.diagnosis.effects import MeasurementError
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.plant_section import in_addition, read_flux_map
 from fluxproof.diagnosis.ground.recording import from_columns
 from fluxproof.diagnosis.session import run
 
 MOST_LEFT = 0.05  # of the power of the misfit above its noise floor
+STAYS = {  # beside measurement errors, which are in the recording itself
+    "magnet_temperature": "the temperature of the magnets is not recorded, so that a coefficient cannot be applied",
+    "demagnetisation": "a drive file has one magnet flux, and this recording has two",
+}
 
 
 def sizes(answer):
@@ -34,8 +39,8 @@ def sizes(answer):
 @pytest.mark.parametrize("name", halved(CATALOGUE, every=4))
 def test_the_improved_drive_leaves_no_misfit(name, tmp_path):
     effect = CATALOGUE[name]
-    if effect.stays:
-        pytest.skip(effect.stays)
+    if isinstance(effect, MeasurementError) or name in STAYS:
+        pytest.skip(STAYS.get(name, "an error of measurement stays in the recording"))
     recording = with_effect(effect)
     answer = diagnose(recording, NOMINAL)
     assert name in {e.name for e in answer.effects}, (answer.sentence, answer.notes)

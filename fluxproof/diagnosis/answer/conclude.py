@@ -19,6 +19,8 @@ from fluxproof.diagnosis.answer.sizes import Sizes, fit_of, with_stray
 from fluxproof.diagnosis.answer.unknown import sparse_term
 from fluxproof.diagnosis.answer.verdict import at_floor, is_usual, kind_of
 from fluxproof.diagnosis.balance.orders import at_order
+from fluxproof.diagnosis.effects import ShaftTorque
+from fluxproof.diagnosis.effects.drive_file import caveat
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.result import Diagnosis, UnknownTerm
 from fluxproof.diagnosis.inference.posterior import Posterior
@@ -55,7 +57,7 @@ def judge(posterior, held) -> Judgement:
     stray = setup.call(stray_of, posterior, frozenset(names.suspects), held)
     if not stray and _is_noise(posterior, names, held):
         # What only the angle of a free shaft shows is in no size: there the names decide.
-        shaft = {n for n, effect in setup.effects.items() if effect.mechanical}
+        shaft = {n for n, effect in setup.effects.items() if isinstance(effect, ShaftTorque)}
         hidden = setup.view.turns_freely.any() or not measured_torque(setup)
         names = names.withheld(frozenset(shaft if hidden else ()))
     told = told_of(names, best)
@@ -63,7 +65,7 @@ def judge(posterior, held) -> Judgement:
     train = Sizes(setup, before, after, ~held, measured_torque(setup))
     unseen = Sizes(setup, before, after, held, measured_torque(setup))
     channel = train.primary()
-    electrical = [n for n in told if not setup.effects[n].mechanical]
+    electrical = [n for n in told if not isinstance(setup.effects[n], ShaftTorque)]
     share = unseen.share(channel) if electrical or (told and measured_torque(setup)) else None
     kind = kind_of(names, train, unseen, channel, share, stray)
     return Judgement(posterior, kind, names, told, channel, share, stray, train, unseen)
@@ -180,7 +182,7 @@ def conclude(posterior, held, progress=lambda text: None) -> Diagnosis:
     answer.evidence = evidence(view, (cells, before), (cells, after), setup.noise, held)
     answer.sentence = sentence(answer, setup.effects)
     answer.notes += balance_notes(view, held, setup.effects, answer.ambiguity)
-    answer.notes += [text for e in answer.effects if (text := setup.effects[e.name].caveat(view, best.c[e.name]))]
+    answer.notes += [text for e in answer.effects if (text := caveat(setup.effects[e.name], view, best.c[e.name]))]
     answer.held = held
     for name in names.suspects:
         if answer.unknown_term is None or answer.unknown_term.meaning != setup.effects[name].clause:
@@ -241,7 +243,7 @@ def stray_of(posterior, suspects, held) -> Stray | None:
     certain = np.flatnonzero(doubt <= k.FORMS_LEFT * before) if best.names else np.arange(len(setup.view))
     if not len(certain):
         return None
-    known = sorted({h for n in best.names for h in effects[n].trailing})
+    known = sorted({h for n in best.names for h in effects[n].shows_at.trailing})
     view, rows = problem.view.take(certain), row_residual(best)[certain]
     found = stray_order(view, rows, floor, known) or stray_swing(view, rows, floor)
     if found is None and setup.load == 0.0:

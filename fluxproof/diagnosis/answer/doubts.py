@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from fluxproof.diagnosis.answer.phrases import capital, size_text, title_of
-from fluxproof.diagnosis.effects.effect import believable, plausible_range
+from fluxproof.diagnosis.effects import believable, plausible_range
 from fluxproof.diagnosis.ground.quantities import ascii_of, quantity
 
 IMPLAUSIBLE = "is implausible"

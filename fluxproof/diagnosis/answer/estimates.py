@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.effects.drive_file import relative
 from fluxproof.diagnosis.ground.plant_section import in_addition
 from fluxproof.diagnosis.ground.result import NamedEffect
 from fluxproof.diagnosis.inference.problem import covariance_of
@@ -34,7 +35,7 @@ def named_effects(names, posterior, explains, only=None) -> list[NamedEffect]:
         effect, c = effects[name], best.c[name]
         simpler = fewer.c.get(name, c)
         c = {key: (1.0 - absent) * v + absent * simpler.get(key, 0.0) for key, v in c.items()}
-        share = effect.relative({n: best.c[n] for n in best.names}, nominal)
+        share = relative(effect, {n: best.c[n] for n in best.names}, nominal)
         estimates = effect.estimates(c, covariance_of(best, name, best.cov), nominal)
         exact = np.zeros((len(c),) * 2)
         ends = [effect.estimates(x, exact, nominal) for x in (best.c[name], simpler)]

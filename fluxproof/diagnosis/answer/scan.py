@@ -15,6 +15,7 @@ import numpy as np
 from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.balance.quantised_angle import beat_ripple, beat_spectrum
+from fluxproof.diagnosis.effects import LegLoss, MeasurementError
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.machine import rated_torque
 
@@ -49,10 +50,10 @@ def row_residual(fit):
     left = misfit(view)["u"].copy()
     for name, c in fit.c.items():
         effect = effects[name]
-        if effect.corrects:
+        if isinstance(effect, MeasurementError):
             continue
-        seen = view if effect.smoothed else view.with_raw_current()
-        columns = {**effect.core(seen), **effect.free(seen)}
+        seen = view if isinstance(effect, LegLoss) else view.with_raw_current()
+        columns = effect.columns(seen)
         for key, value in c.items():
             if value and "u" in columns.get(key, {}):
                 left -= value * columns[key]["u"]

@@ -3,7 +3,16 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, current_error, phase_error, sigma
+from fluxproof.diagnosis.effects import (
+    DOUBT,
+    FreeCurve,
+    MeasurementError,
+    Orders,
+    Parameter,
+    current_error,
+    phase_error,
+    sigma,
+)
 from fluxproof.diagnosis.ground.result import Estimate
 from fluxproof.plant.transforms import PATTERNS
 
@@ -20,7 +29,7 @@ def gain_column(view, weights):
     return phase_error(view, view.phases(view.i) * np.array(weights))
 
 
-class CurrentGain(Effect):
+class CurrentGain(MeasurementError, FreeCurve):
     def core(self, view):
         return {name: gain_column(view, w) for name, w in PATTERNS.items()}
 
@@ -84,13 +93,10 @@ EFFECT = CurrentGain(
     title="unequal gains of the current sensors",
     equation="i_measured = (1 + g_abc) i",
     signature="order 2 in dq, in proportion to the current; phase currents that do not sum to zero",
-    confounders=("phase_resistance_asymmetry", "inductance_d", "current_scale"),
     separated_by="a sweep of the speed: the sensors' error also follows omega L i; the sum of three measured currents",
     parameters=tuple(Parameter(f"gain_{x}", "1", f"relative error of phase {x}", f"phase {x}") for x in "abc"),
-    shows_at=(2.0,),
     plausible={f"gain_{x}": (-0.1, 0.1) for x in "abc"},
     otherwise="a shunt of another value, a wrong scale of one column, or a converter that clips",
-    corrects=True,
-    stays="an error of measurement is in the recording itself; the trims act from the next one on",
     needs=("harmonics", "current"),
+    shows_at=Orders((2.0,)),
 )

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error
+from fluxproof.diagnosis.effects import Caveat, FreeCurve, MeasurementError, Orders, Parameter, current_error
 from fluxproof.diagnosis.ground.result import Estimate
 from fluxproof.plant.transforms import AXES, PATTERNS
 
@@ -28,7 +28,7 @@ def offset_column(view, weights, course=1.0):
 OFFSETS = {**PATTERNS, "zero": (1.0, 1.0, 1.0)}
 
 
-class CurrentOffset(Effect):
+class CurrentOffset(MeasurementError, FreeCurve, Caveat):
     def _patterns(self, view):
         return {k: w for k, w in OFFSETS.items() if k != "zero" or view.has_sum}
 
@@ -84,13 +84,10 @@ EFFECT = CurrentOffset(
     title="offsets of the current sensors",
     equation="i_measured = i + o_abc",
     signature="order 1 in dq (R o, constant in the stator frame); phase currents that do not sum to zero",
-    confounders=("encoder_eccentricity", "phase_resistance_asymmetry"),
     separated_by="a log at zero current, gates off",
     parameters=tuple(Parameter(f"offset_{x}_a", "A", f"phase {x}, measured minus true", f"phase {x}") for x in PHASES),
-    corrects=True,
-    stays="an error of measurement is in the recording itself; the trims act from the next one on",
-    shows_at=(1.0,),
     plausible={f"offset_{x}_a": (-0.1, 0.1, "machine.rated_current_a") for x in PHASES},
     otherwise="a wrong offset code, or a magnetised current sensor",
     needs=("harmonics", "current"),
+    shows_at=Orders((1.0,)),
 )

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter
+from fluxproof.diagnosis.effects import DOUBT, FreeCurve, Parameter, ShaftTorque
 from fluxproof.diagnosis.ground.machine import rated_torque
 from fluxproof.diagnosis.ground.result import Estimate
 from fluxproof.plant.transforms import linear_limit
@@ -21,7 +21,7 @@ def _top(view):
     return max(float(np.abs(view.omega).max()) / view.machine.pole_pairs, 1e-9)
 
 
-class Friction(Effect):
+class Friction(ShaftTorque, FreeCurve):
     def core(self, view):
         top = _top(view)
         return {
@@ -82,12 +82,10 @@ EFFECT = Friction(
     title="friction different from the drive file",
     equation="T_shaft = T_airgap - B omega_m - T_c sign(omega_m)",
     signature="torque against the motion, odd in speed, at every load",
-    confounders=("iron_loss",),
     separated_by="a torque transducer, or a no-load coast-down in both directions",
     parameters=(
         Parameter("viscous_friction_nms", "Nm s", "per mechanical rad/s", "viscous"),
         Parameter("coulomb_friction_nm", "Nm", "dry", "dry"),
     ),
-    mechanical=True,
     needs=("harmonics",),
 )

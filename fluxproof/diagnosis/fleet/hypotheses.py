@@ -17,13 +17,14 @@ from fluxproof.diagnosis.answer.conclude import measured_torque
 from fluxproof.diagnosis.answer.names import credibilities
 from fluxproof.diagnosis.answer.sizes import UNITS, Sizes
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.effects import Spread
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.result import Remainder
 from fluxproof.diagnosis.inference.posterior import possible
 from fluxproof.diagnosis.inference.problem import covariance_of, log_too_small
 from fluxproof.diagnosis.inference.settle import around, settled
 
-BASE = tuple(name for name, effect in CATALOGUE.items() if effect.spreads)
+BASE = tuple(name for name, effect in CATALOGUE.items() if isinstance(effect, Spread))
 CLOSE = 20.0  # log evidence below the best within which a set is kept: e^-20 is no alternative at any rate
 KEPT = 8  # sets of a recording that go into its row
 OWN = 6  # sets that are judged on their own linearisation in a round
@@ -169,9 +170,8 @@ def estimates(fit) -> list[Estimated]:
     for name in fit.names:
         c = dict(fit.c[name])
         for key in c:
-            for column in ((name, key), (name, f"~{key}")):
-                if column in place:
-                    c[key] = float(values[place[column]])
+            if (name, key) in place:
+                c[key] = float(values[place[name, key]])
         found = effects[name].estimates(c, covariance_of(fit, name, covariance), nominal)
         out += [Estimated(name, key, float(e.value), float(e.sigma), e.unit) for key, e in found.items()]
     return out
@@ -184,7 +184,7 @@ def without_prior(fit) -> tuple[np.ndarray, np.ndarray]:
     columns leaves what the data say.  A direction of which they say nothing gets a sigma of 1000 prior sizes.
     """
     owner = np.array([fit.names.index(fit.problem.keys[n][0]) for n in fit.take], int)
-    core = np.array([not fit.problem.keys[n][1].startswith("~") for n in fit.take], bool)
+    core = np.array([fit.problem.keys[n] not in fit.problem.cells.free for n in fit.take], bool)
     sd = fit.sizes[owner] * fit.problem.prior[fit.take]
     precision = np.linalg.inv(fit.cov / np.outer(sd, sd))  # in units of the prior: well conditioned
     right = precision @ (fit.vector / sd)

@@ -9,6 +9,7 @@ import itertools
 import numpy as np
 
 from fluxproof.diagnosis.balance.cells import voltage_level
+from fluxproof.diagnosis.effects import FarStart, MeasurementError
 from fluxproof.diagnosis.inference.problem import Problem, covariance_of
 from fluxproof.diagnosis.inference.settle import around, fit_at, settled
 from fluxproof.diagnosis.inference.setup import Setup
@@ -45,9 +46,9 @@ class Posterior:
         self._add(first, [()])
         self._add(first, [(n,) for n in able])
         for name in able:
-            if self.setup.effects[name].corrects:
+            if isinstance(self.setup.effects[name], MeasurementError):
                 self._linearise((name,))
-        far = [n for n in able if self.setup.effects[n].starts and self._approach(n)]
+        far = [n for n in able if isinstance(self.setup.effects[n], FarStart) and self._approach(n)]
         for fit in sorted((f for f in self.fits.values() if len(f.names) == 1), key=lambda f: -f.value)[:LEADERS]:
             if fit.names not in self.own:
                 self._linearise(fit.names)
@@ -136,7 +137,7 @@ class Posterior:
 
     def _errors(self, names) -> frozenset:
         """The measurement errors of a set, which are removed from the data: what is far from linear."""
-        return frozenset(n for n in names if self.setup.effects[n].corrects)
+        return frozenset(n for n in names if isinstance(self.setup.effects[n], MeasurementError))
 
     def _neighbours(self, problem, names, errors=None):
         """Judge the sets near ``names``; errors: only those with these measurement errors (None: all)."""

@@ -20,7 +20,8 @@ import numpy as np
 from fluxproof.diagnosis.balance.misfit import bulge
 from fluxproof.diagnosis.conventions.reading import Reading
 from fluxproof.diagnosis.conventions.table import pole_pairs_for, readings_for
-from fluxproof.diagnosis.effects.effect import torque_of
+from fluxproof.diagnosis.effects import torque_of
+from fluxproof.diagnosis.effects.constant import rescaled
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.machine import flux_terms
 from fluxproof.diagnosis.inference.evidence import evidence
@@ -80,7 +81,7 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
         other = setup.call(Posterior, read, progress)
         value = other.best().value + prior + terms.jacobian(j.readings)
         left = other.best().names
-        exact = not any(set(setup.effects[n].rescales) & r.touches for n in left for r in j.readings)
+        exact = not any(rescaled(setup.effects[n]) & r.touches for n in left for r in j.readings)
         # Other pole pairs scale L_d, L_q and psi: instead of one effect of a plausible size they would be chance.
         cost = sum(1 + bool(r.pole_pairs and not absurd) for r in j.readings)
         few = len(left) + cost <= most or (not left and cost == len(j.readings))

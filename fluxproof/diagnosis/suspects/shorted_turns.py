@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, sigma
+from fluxproof.diagnosis.effects import Alternatives, FreeCurve, Orders, Parameter, current_error, one, sigma
 from fluxproof.plant.transforms import AXES, linear_limit
 
 PHASES = "abc"
@@ -20,7 +20,9 @@ def _short(view, phase):
     return columns
 
 
-class ShortedTurns(Effect):
+class ShortedTurns(FreeCurve, Alternatives):
+    one_of = tuple((phase, f"{phase}_lag") for phase in PHASES)
+
     def core(self, view):
         return {phase: _short(view, phase)[""] for phase in PHASES}
 
@@ -57,11 +59,8 @@ EFFECT = ShortedTurns(
     clause="turns of one phase were shorted",
     equation="i = i_terminal - (2/3) g Re(j omega psi e^(-j phase)) e^(j phase)",
     signature="orders 0 and -2 of equal size, proportional to omega^2, and a drag torque",
-    confounders=("iron_loss", "phase_resistance_asymmetry", "current_gain"),
     separated_by="standstill, where a short vanishes but a resistance or gain error of one phase does not",
     parameters=tuple(Parameter(f"conductance_{x}_s", "S", f"of the short, referred to phase {x}") for x in PHASES),
-    named=False,
-    one_of=tuple((phase, f"{phase}_lag") for phase in PHASES),
-    shows_at=(0.0, 2.0),
     needs=("harmonics", "angle"),
+    shows_at=Orders((0.0, 2.0)),
 )
