@@ -15,6 +15,7 @@ from cocotb_tests.support.recordings.from_core import recorded
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis import catalogue, diagnose, physics
 from fluxproof.diagnosis.balance.blocks import view_of
+from fluxproof.diagnosis.balance.cells import cells_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.effects.free_curve import free_columns
 from fluxproof.diagnosis.ground.nominal import load_nominal
@@ -118,6 +119,17 @@ def test_no_effect_is_named_outside_of_its_file():
         if path.parent.name not in ("catalogue", "suspects", "example"):
             strings = {n.value for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Constant)}
             assert not {s for s in strings if isinstance(s, str)} & names, path
+
+
+def test_free_columns_are_a_declared_set(view):
+    """A free column is one of ``Cells.free``, whatever its key looks like."""
+    cells = cells_of(view, CATALOGUE.values())
+    for effect in CATALOGUE.values():
+        free = {key for name, key in cells.free if name == effect.name}
+        assert free == set(free_columns(effect, view)) and not free & set(effect.core(view))
+        assert list(cells.columns[effect.name]) == list(effect.columns(view))
+    for path in sorted((ROOT / "fluxproof" / "diagnosis").rglob("*.py")):
+        assert '"~' not in path.read_text(), f"{path}: a mark of free columns that nothing sets"
 
 
 def test_a_new_file_is_a_new_effect(tmp_path, monkeypatch):
