@@ -15,6 +15,7 @@ SQRT3 = math.sqrt(3.0)
 AXES: NDArray[np.complex128] = np.exp(
     2j * np.pi / 3 * np.arange(3)
 )  # directions of the phases a, b, c in the stator frame
+ANGLES = {"a": 0.0, "b": 2.0 * np.pi / 3.0, "c": -2.0 * np.pi / 3.0}  # of these directions [rad]
 # Phase values of a unit of alpha or beta over 3/2: patterns of three deviations whose sum is zero.
 PATTERNS = {"alpha": (2 / 3, -1 / 3, -1 / 3), "beta": (0.0, 3**-0.5, -(3**-0.5))}
 

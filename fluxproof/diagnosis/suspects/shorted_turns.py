@@ -4,7 +4,7 @@
 import numpy as np
 
 from fluxproof.diagnosis.effects import Alternatives, FreeCurve, Orders, Parameter, current_error, one, sigma
-from fluxproof.plant.transforms import AXES, linear_limit
+from fluxproof.plant.transforms import ANGLES, linear_limit
 
 PHASES = "abc"
 LAG_S = 1e-4  # time in which the current of the short follows its EMF, L / R of the shorted turns
@@ -12,7 +12,7 @@ LAG_S = 1e-4  # time in which the current of the short follows its EMF, L / R of
 
 def _short(view, phase):
     """{"": column of the resistive current, "_lag": of its lag} of one phase, per siemens referred to the phase."""
-    axis = AXES[PHASES.index(phase)] * np.conj(view.turn)
+    axis = np.exp(1j * (ANGLES[phase] - view.theta))
     columns = {}
     for name, turned in {"": 1.0, "_lag": -1j * view.omega * LAG_S}.items():
         emf = (1j * view.omega * turned * view.psi * np.conj(axis)).real
