@@ -34,9 +34,10 @@ class Kernel(Protocol[P, R_co]):
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R_co: ...
 
 
-def _source_hash() -> str:
+def source_hash(folder: Path) -> str:
+    """Hash of all Python files of a folder, and of numba's version."""
     digest = hashlib.sha256(numba.__version__.encode())
-    for path in sorted(PACKAGE.rglob("*.py")):
+    for path in sorted(folder.rglob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
@@ -69,7 +70,7 @@ def _user() -> int:
     return getattr(os, "getuid", lambda: 0)()
 
 
-CACHE_DIR = _cache_root() / "numba" / _source_hash()
+CACHE_DIR = _cache_root() / "numba" / source_hash(PACKAGE)
 
 
 def kernel(function: Callable[P, R_co], cache_dir: Path = CACHE_DIR) -> Kernel[P, R_co]:

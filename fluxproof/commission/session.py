@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fluxproof.commission.bus import Bus
+from fluxproof.plant.transforms import linear_limit
 from golden_model.board_registers import SECTORS, board_registers
 from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError
@@ -213,7 +214,7 @@ class Session:
     def voltage(self) -> float:
         """The largest voltage at the present bus voltage [V]."""
         u_dc = to_si("u_dc", self.bus.snapshot()["u_dc"], self.drive)
-        return u_dc / math.sqrt(3.0) * (1.0 - self.drive.control.voltage_reserve)
+        return linear_limit(u_dc) * (1.0 - self.drive.control.voltage_reserve)
 
     def know(self, section: str, **values) -> None:
         """Replace what the drive file says; Refusal where the file's other values forbid it."""

@@ -33,6 +33,7 @@ import math
 import numpy as np
 
 from fluxproof.commission.session import Refusal, Seen, Session, Step, Value, solve
+from fluxproof.plant.transforms import AXES
 from golden_model.encoders.forced_position import RATE
 from golden_model.units import TURN_RAD
 
@@ -70,7 +71,7 @@ class Point:
     def _signs(self, rotor: float) -> np.ndarray:
         """c_1, c_-1 of the vector of the phase currents' signs."""
         current = np.exp(1j * np.outer(GRID, ORDERS)) @ self.i
-        axes = np.exp(1j * (TURN_RAD / 3.0 * np.arange(3) - rotor))
+        axes = AXES * np.exp(-1j * rotor)
         vector = 2.0 / 3.0 * np.sign(np.real(np.outer(current, np.conj(axes)))) @ axes
         return np.array([np.mean(vector * np.exp(-1j * n * GRID)) for n in (1, -1)])
 

@@ -32,7 +32,6 @@ HOLD_S, GROWN = 0.25, 1.8  # after LOOKED_FOR; ended early above so many times o
 OPEN_BELOW = 0.15  # of the largest current of any phase
 FITS = 0.8  # correlation of the answers with the true order; a wrong one reaches 0.5
 LEAST_BUS = 0.7  # of the nominal voltage
-AXES = np.exp(1j * TURN_RAD / 3.0 * np.arange(3))
 
 
 def offsets(session: Session) -> Step:

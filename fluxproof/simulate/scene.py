@@ -13,6 +13,7 @@ import numpy as np
 
 from fluxproof.cosim.closed_loop import Scenario
 from fluxproof.cosim.scenarios import RPM, scenario
+from fluxproof.plant.transforms import linear_limit
 from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError
 from golden_model.scaling import speed_gains
@@ -66,7 +67,7 @@ def voltage(drive: Drive, omega_m: float, i_q: float) -> float:
 
 def voltage_limit(drive: Drive) -> float:
     """Radius of the voltage circle at the nominal bus, reserve taken off [V]."""
-    return drive.inverter.dc_bus_v / math.sqrt(3.0) * (1.0 - drive.control.voltage_reserve)
+    return linear_limit(drive.inverter.dc_bus_v) * (1.0 - drive.control.voltage_reserve)
 
 
 def reach(drive: Drive, i_q: float) -> float:

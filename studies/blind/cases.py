@@ -25,7 +25,7 @@ STRATA = {
     "damaged": 0.08,
 }
 
-# The catalogue's confounders: pairs in which one effect can imitate the other.
+# Pairs in which one effect can imitate the other.
 CONFOUNDED = [
     ("resistance", "iron_loss"),
     ("resistance", "magnet_flux"),

@@ -13,6 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.machine import airgap_torque, flux_linkage, rated_torque, slope_in_zero_vector
+from fluxproof.plant.transforms import PATTERNS, space_vector
 from studies.compare.data import Data
 from studies.compare.dictionary import SOFT, TORQUE_ORDERS
 
@@ -49,7 +51,7 @@ PARAMETERS = {
 }
 ONLY = {"offset_0": "sum", "k_t": "torque", "viscous": "torque", "coulomb": "torque"}
 # Two patterns over the phases whose sum is zero.
-ALPHA, BETA = np.array([2, -1, -1]) / 3, np.array([0, 1, -1]) / np.sqrt(3)
+ALPHA, BETA = (np.array(weights) for weights in PATTERNS.values())
 
 
 class Model:
@@ -65,7 +67,7 @@ class Model:
             if ("torque" if name.startswith("cog") else ONLY.get(name, "u")) in self.channels
         ]
         self.top = max(float(np.abs(data.view.omega).max()), 1e-9)
-        self.rated_torque = 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
+        self.rated_torque = rated_torque(m)
         self.time = (v.t / max(v.span_s, 1e-9))[:, None]
         temp = data.view.temp
         known = np.isfinite(temp).all() and np.ptp(temp) > 3.0
@@ -79,9 +81,7 @@ class Model:
 
     def _slope(self):
         """Slope of the current within the zero vector, dq (b, m+1) [A/s]."""
-        v, m = self.v, self.v.machine
-        emf = -m.resistance_ohm * v.i - 1j * v.omega * v.nominal_psi
-        return emf.real / m.inductance_d_h + 1j * emf.imag / m.inductance_q_h + 1j * v.omega * v.i
+        return slope_in_zero_vector(self.v.machine, self.v.i, self.v.omega, self.v.nominal_psi)
 
     def __call__(self, p: np.ndarray) -> dict[str, np.ndarray]:
         """Change of every channel (b, m) against the nominal drive, for parameters in the order of ``names``."""
@@ -99,8 +99,7 @@ class Model:
         phases = (self.phases - offset) / (1.0 + gain)
         theta = v.theta - turn
         rotor = np.exp(1j * theta)
-        stator = (2 / 3) * (phases @ np.exp(2j * np.pi / 3 * np.arange(3)))
-        i = stator / rotor - p["skew"] * v.sample_time_s * self.i_rate
+        i = space_vector(phases) / rotor - p["skew"] * v.sample_time_s * self.i_rate
         psi, harmonics, reluctance = self._flux(p, i, theta)
         total = (psi + harmonics) * rotor
         x = 0.5 * (phases[:, 1:] + phases[:, :-1])
@@ -110,13 +109,13 @@ class Model:
         i_s = i * rotor
         r = m.resistance_ohm * (1.0 + p["R"] + p["R_warm"] * self.warm)
         u = r * 0.5 * (i_s[:, 1:] + i_s[:, :-1]) + (total[:, 1:] - total[:, :-1]) / v.sample_time_s
-        u = u + (2 / 3) * (legs @ np.exp(2j * np.pi / 3 * np.arange(3)))
+        u = u + space_vector(legs)
         out = {"u": u * self.back + p["delay"] * self.du}
         if "sum" in self.channels:
             wrong = (self.phases - phases).sum(axis=2)
             out["sum"] = 0.5 * (wrong[:, 1:] + wrong[:, :-1])
         if "torque" in self.channels:
-            airgap = 1.5 * m.pole_pairs * (np.conj(psi + reluctance) * i).imag
+            airgap = airgap_torque(m, psi + reluctance, i)
             out["torque"] = 0.5 * (1.0 + p["k_t"]) * (airgap[:, 1:] + airgap[:, :-1]) - self._shaft(p)
         return out
 
@@ -124,8 +123,7 @@ class Model:
         """Flux linkage (b, m+1), that of the harmonics, and the harmonics as they count for the torque."""
         m, i_r = self.v.machine, self.v.machine.rated_current_a
         if p["g_fe"]:
-            psi_0 = m.inductance_d_h * i.real + 1j * m.inductance_q_h * i.imag + m.magnet_flux_wb
-            i = i - 1j * self.v.omega / self.top * psi_0 / m.magnet_flux_wb * p["g_fe"] * i_r
+            i = i - 1j * self.v.omega / self.top * flux_linkage(m, i) / m.magnet_flux_wb * p["g_fe"] * i_r
         d, q = i.real / i_r, i.imag / i_r
         l_d, l_q, psi_m = m.inductance_d_h * i_r, m.inductance_q_h * i_r, m.magnet_flux_wb
         psi_d = l_d * ((1.0 + p["L_d"]) * d - p["sat_d"] * d**3)

@@ -23,6 +23,7 @@ from scipy.spatial import Delaunay, cKDTree
 
 from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.ground.machine import flux_linkage
 from fluxproof.diagnosis.ground.result import Estimate
 from fluxproof.plant import FluxMap
 from studies.real.flux_splines import emf_columns, gradients, knots_over, powers
@@ -37,6 +38,11 @@ SHAPES = (
     "separable",
     "full",
 )  # inductances and magnet flux; a separate curve per axis; any reciprocal surface
+SHAPES_OF = {  # {effect: shapes of a map without it and with it}
+    "saturation": ("linear", "separable"),
+    "cross_saturation": ("separable", "full"),
+}
+BESIDE = ("dead_time", "resistance")  # functions of the current that are no flux: fitted together with a map
 
 
 @dataclass
@@ -65,8 +71,8 @@ class Surface:
 
     def psi(self, i) -> np.ndarray:
         """Flux linkage including the magnet, complex [Wb], at dq currents of any shape, complex [A]."""
-        m, i = self.machine, np.asarray(i)
-        return m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag + self.surplus(i)
+        i = np.asarray(i)
+        return flux_linkage(self.machine, i) + self.surplus(i)
 
     def covered(self, i) -> np.ndarray:
         """Whether dq currents (any shape) lie between neighbouring recorded operating points, bool."""
@@ -119,8 +125,7 @@ def ladder(view, train, beside=None) -> dict[str, dict]:
 def names(steps: dict[str, dict], noise_v: float) -> list[str]:
     """Names that follow from a ladder: each step must predict BETTER times better and by more than the noise."""
     found = []
-    maps = sorted((e for e in CATALOGUE.values() if e.map_shapes), key=lambda e: SHAPES.index(e.map_shapes[1]))
-    for name, (before, after) in ((e.name, e.map_shapes) for e in maps):
+    for name, (before, after) in SHAPES_OF.items():
         worse, better = steps[before]["holdout"], steps[after]["holdout"]
         if worse > BETTER * better and worse**2 - better**2 > noise_v**2:
             found.append(name)
@@ -238,7 +243,7 @@ class _Problem:
 
 def _beside(names) -> tuple[str, ...]:
     """Effects that are fitted together with a map; by default the functions of the current that are no flux."""
-    return tuple(n for n, e in CATALOGUE.items() if e.beside_map) if names is None else tuple(names)
+    return BESIDE if names is None else tuple(names)
 
 
 def _basis(shape, knots_d, knots_q):

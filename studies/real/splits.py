@@ -7,7 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import FluxEffect
+from fluxproof.diagnosis.effects import FluxEffect
+from fluxproof.diagnosis.ground.machine import flux_linkage
 from fluxproof.diagnosis.inference.converge import around, converged, fit_of_set
 from fluxproof.diagnosis.inference.fitted_set import covariance_of, possible
 from fluxproof.diagnosis.inference.setup import Setup
@@ -75,7 +76,7 @@ def flux_map_of(fit) -> FluxMap | None:
     edge = [max(np.abs(x).max(), ROUND * m.rated_current_a) for x in (seen.real, seen.imag)]
     axes = [np.linspace(-e, e, n) for e, n in zip(edge, STEPS, strict=True)]
     i = axes[0][:, None] + 1j * axes[1]
-    psi = m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag
+    psi = flux_linkage(m, i)
     at = SimpleNamespace(i=i, machine=m, nominal=view.nominal, course=np.zeros(len(i)))
     for name in magnetic:
         psi = psi + effects[name].psi(at, fit.c[name])

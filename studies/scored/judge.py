@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import re
 
-from fluxproof.diagnosis.answer.phrases import CORRECTED
+from fluxproof.diagnosis.words.phrases import CORRECTED
 from studies.scored.sizes import size_fault
 from studies.scored.truth import Truth
 

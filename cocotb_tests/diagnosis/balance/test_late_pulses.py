@@ -9,7 +9,7 @@ from cocotb_tests.support.recordings.from_core import recorded
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.late_pulses import high, instant, late_ripple, off_valley
 from fluxproof.diagnosis.catalogue import CATALOGUE, delay, sampling_skew
-from fluxproof.diagnosis.effects.effect import current_error
+from fluxproof.diagnosis.effects import current_error
 from fluxproof.diagnosis.ground.nominal import load_nominal
 
 STEPS = 20_000

@@ -15,7 +15,9 @@ from cocotb_tests.support.recordings.from_core import recorded
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis import catalogue, diagnose, physics
 from fluxproof.diagnosis.balance.blocks import view_of
+from fluxproof.diagnosis.balance.cells import cells_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.effects.free_curve import free_columns
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.plant_keys import check_key, plain
 from fluxproof.diagnosis.physics import known_effects
@@ -47,7 +49,6 @@ def test_catalogue_entries_are_complete(name):
     effect = CATALOGUE[name]
     assert effect.name == name and effect.title and effect.signature and effect.separated_by
     assert "=" in effect.equation
-    assert effect.confounders and set(effect.confounders) <= set(CATALOGUE) - {name}
     assert effect.parameters and all(p.name.isidentifier() and p.unit and p.meaning for p in effect.parameters)
     assert np.isfinite(effect.floor(NOMINAL)) and effect.floor(NOMINAL) > 0.0
 
@@ -55,15 +56,15 @@ def test_catalogue_entries_are_complete(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_columns_of_an_effect_are_finite_and_nonzero(name, view):
     effect = CATALOGUE[name]
-    core = effect.core(view)
-    assert core
-    for key, column in (core | effect.free(view)).items():
+    core, every = effect.core(view), effect.columns(view)
+    assert core and not set(core) & set(free_columns(effect, view)), "a coefficient of both"
+    for key, column in every.items():
         assert column.keys() <= {"u", "sum", "torque"}, key
         assert all(np.isfinite(values).all() for values in column.values()), key
         assert any(np.abs(values).max() > 0.0 for values in column.values()), key
     # The coefficients give parameters that the entry declares, and keys of the plant.
     units = {p.name: p.unit for p in effect.parameters}
-    for keys in (core, core | effect.free(view)):
+    for keys in (core, every):
         c = dict.fromkeys(keys, 1e-3)
         found = effect.estimates(c, np.eye(len(c)) * 1e-8, NOMINAL)
         assert found and found.keys() <= units.keys()
@@ -82,7 +83,7 @@ def test_every_effect_of_the_issue_has_a_file_of_its_own():
 
 NEW_EFFECT = """
 import numpy as np
-from fluxproof.diagnosis.effects.effect import FluxEffect, Parameter, one, sigma
+from fluxproof.diagnosis.effects import FluxEffect, Parameter, one, sigma
 
 class SecondHarmonic(FluxEffect):
     def core_psi(self, view):
@@ -102,7 +103,7 @@ class SecondHarmonic(FluxEffect):
 EFFECT = SecondHarmonic(
     name="second_harmonic", title="second harmonic of the magnet flux",
     equation="psi = psi_m (1 + a exp(2j theta))", signature="order 2 in dq, proportional to speed",
-    confounders=("current_gain",), separated_by="rotation at zero current",
+    separated_by="rotation at zero current",
     parameters=(Parameter("order_2", "1", "amplitude relative to the magnet flux"),),
 )
 """
@@ -118,6 +119,17 @@ def test_no_effect_is_named_outside_of_its_file():
         if path.parent.name not in ("catalogue", "suspects", "example"):
             strings = {n.value for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Constant)}
             assert not {s for s in strings if isinstance(s, str)} & names, path
+
+
+def test_free_columns_are_a_declared_set(view):
+    """A free column is one of ``Cells.free``, whatever its key looks like."""
+    cells = cells_of(view, CATALOGUE.values())
+    for effect in CATALOGUE.values():
+        free = {key for name, key in cells.free if name == effect.name}
+        assert free == set(free_columns(effect, view)) and not free & set(effect.core(view))
+        assert list(cells.columns[effect.name]) == list(effect.columns(view))
+    for path in sorted((ROOT / "fluxproof" / "diagnosis").rglob("*.py")):
+        assert '"~' not in path.read_text(), f"{path}: a mark of free columns that nothing sets"
 
 
 def test_a_new_file_is_a_new_effect(tmp_path, monkeypatch):

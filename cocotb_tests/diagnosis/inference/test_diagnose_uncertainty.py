@@ -11,6 +11,7 @@ from cocotb_tests.support.recordings.from_core import DRIVE, MACHINE, POINT, col
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.effects import Wave
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import from_columns
 from fluxproof.diagnosis.inference.converge import fit_of_set
@@ -120,6 +121,6 @@ def test_undetermined_parameters_are_omitted():
     of = lambda name, *c: CATALOGUE[name].estimates(dict(c), np.diag([(1e-3 * v) ** 2 for _, v in c]), NOMINAL)  # noqa: E731
     assert set(of("saturation", ("q_3", -0.1))) == {"psi_q_change_at_rated_wb"}
     assert set(of("saturation", ("q_3", -0.1), ("d_3", 0.1))) == {f"psi_{x}_change_at_rated_wb" for x in "dq"}
-    waves = [(f"h6_{k}", 0.01) for k in range(4)] + [(f"h12_{k}", 0.0) for k in range(4)]
+    waves = [(Wave(h, part), size) for h, size in ((6, 0.01), (12, 0.0)) for part in ("fc", "fs", "bc", "bs")]
     assert set(of("emf_harmonics", *waves)) == {"order_6"}
     assert set(of("emf_harmonics", *waves[:4], *((k, 0.01) for k, _ in waves[4:]))) == {"order_6", "order_12"}

@@ -204,10 +204,10 @@ def test_the_watch_sees_what_runs(tmp_path):
     assert {"exec", "open", "import"} <= {name for name, _ in events}
 
 
-@pytest.mark.parametrize("module", [kernel, jit])
-def test_the_cache_of_compiled_code_is_the_users_own(tmp_path, module):
+def test_the_cache_of_compiled_code_is_the_users_own(tmp_path):
     """numba unpickles it, so a folder that others can write is not used."""
-    _private = module._private
+    _private = kernel._private
+    assert jit.CACHE_DIR.parent == kernel.CACHE_DIR.parent and jit.CACHE_DIR != kernel.CACHE_DIR
     own = _private(tmp_path / "own")
     assert own == tmp_path / "own" == _private(own) and own.stat().st_mode & 0o777 == 0o700
     own.chmod(0o777)

@@ -16,6 +16,7 @@ from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.command import answer_lines
 from fluxproof.diagnosis.decide.locate import at_order, harmonic
 from fluxproof.diagnosis.decide.sizes import Sizes
+from fluxproof.diagnosis.effects import MeasurementError
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.plant_section import in_addition, read_flux_map
 from fluxproof.diagnosis.ground.recording import from_columns
@@ -23,6 +24,10 @@ from fluxproof.diagnosis.improve.improve import write_improved
 from fluxproof.diagnosis.session import run, work
 
 MOST_LEFT = 0.05  # of the power of the misfit above its noise floor
+STAYS = {  # beside measurement errors, which are in the recording itself
+    "magnet_temperature": "the temperature of the magnets is not recorded, so that a coefficient cannot be applied",
+    "demagnetisation": "a drive file has one magnet flux, and this recording has two",
+}
 
 
 def sizes(worked):
@@ -34,8 +39,8 @@ def sizes(worked):
 @pytest.mark.parametrize("name", halved(CATALOGUE, every=4))
 def test_the_improved_drive_leaves_no_misfit(name, tmp_path):
     effect = CATALOGUE[name]
-    if effect.stays:
-        pytest.skip(effect.stays)
+    if isinstance(effect, MeasurementError) or name in STAYS:
+        pytest.skip(STAYS.get(name, "an error of measurement stays in the recording"))
     recording = with_effect(effect)
     first = work(recording, NOMINAL)
     answer = first.answer()

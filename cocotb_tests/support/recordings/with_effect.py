@@ -15,6 +15,7 @@ from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.recordings.from_core import DRIVE, GRID, columns
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.misfit import shaft_torque
+from fluxproof.diagnosis.effects import Drift, ShaftTorque
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import from_columns
 
@@ -106,9 +107,9 @@ def with_effect(effect):
     duty[: len(needed) - delay] = needed[delay:]  # the duties of a row act this many periods later
     for k, x in enumerate("abc"):
         table[f"d_{x}"] = table[f"d_{x}"] + (duty * TURNS[k]).real / table["u_dc"]
-    if not effect.drift_of:  # only a drift needs a machine that warms up
+    if not isinstance(effect, Drift):  # only a drift needs a machine that warms up
         del table["temp_winding"]
     torque = table.pop("torque") + at_samples(total["torque"], count)
-    if effect.mechanical:
+    if isinstance(effect, ShaftTorque):
         table["torque"] = torque
     return from_columns(table, T, effect.name)

@@ -18,6 +18,7 @@ from fluxproof.diagnosis.balance.view import HALF_WIDTH, SLOPE_REACH, View, lack
 from fluxproof.diagnosis.ground.arrays import Complex
 from fluxproof.diagnosis.ground.nominal import flux_level
 from fluxproof.diagnosis.ground.recording import Recording, RecordingError
+from fluxproof.plant.transforms import space_vector
 
 BLOCK_ROWS = 200
 SHORTER = (100, 50)  # for short dwells
@@ -51,8 +52,7 @@ def stator_current(recording: Recording, theta) -> tuple[Complex, np.ndarray | N
     if r.has("i_a", "i_b"):
         third = r["i_c"] if r.has("i_c") else -r["i_a"] - r["i_b"]
         abc = np.stack([r["i_a"], r["i_b"], third], axis=1)
-        turned: Complex = abc @ np.exp(2j * np.pi / 3 * np.arange(3))
-        return (2 / 3) * turned, abc if r.has("i_c") else None
+        return space_vector(abc), abc if r.has("i_c") else None
     return (r["i_d"] + 1j * r["i_q"]) * np.exp(1j * theta), None  # a dq log was already rotated by the drive
 
 
@@ -157,14 +157,12 @@ def _voltage(recording, nominal, theta_s) -> tuple[Complex, np.ndarray]:
     r, n, delay = recording, len(recording), nominal.control.duty_applied_after_samples
     u_dc = r["u_dc"] if r.has("u_dc") else np.full(n, float(nominal.inverter.dc_bus_v))
     u_dc_mid = np.append(0.5 * (u_dc[1:] + u_dc[:-1]), u_dc[-1])
-    turns = np.exp(2j * np.pi / 3 * np.arange(3))
     if "inverter" in r.lacks:  # measured means of the interval after each sample (emf.py)
-        measured: Complex = np.stack([r["u_a"], r["u_b"], r["u_c"]], axis=1) @ turns
-        return (2 / 3) * measured, u_dc_mid
+        return space_vector(np.stack([r["u_a"], r["u_b"], r["u_c"]], axis=1)), u_dc_mid
     asked: Complex = np.full(n, np.nan + 0j)
     if r.has("d_a", "d_b", "d_c"):
         duties = np.stack([r["d_a"], r["d_b"], r["d_c"]], axis=1)
-        asked[delay:] = ((2 / 3) * (duties @ turns))[: n - delay]
+        asked[delay:] = space_vector(duties)[: n - delay]
         return asked * u_dc_mid, u_dc_mid
     # The controller advances its reference by the delay angle, so that it is valid at the middle of its period.
     asked[delay:] = (r["u_d_ref"] + 1j * r["u_q_ref"])[: n - delay]

@@ -18,6 +18,7 @@ from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.balance.quantised_angle import beat_variance
 from fluxproof.diagnosis.balance.shaft import bend_gain
 from fluxproof.diagnosis.balance.torque_order import torque_orders
+from fluxproof.diagnosis.effects.free_curve import free_columns
 
 ORDERS_SUM = (0.0, 1.0, 2.0)
 LEAST_TURNS = 0.8  # periods of a harmonic within a block; with fewer it is not independent of order 0
@@ -38,7 +39,7 @@ class Cells:
 
     y: (r,) misfit; columns: {effect: {coefficient: (r,)}}; block, order, part: (r,) origin of a row, part 0 and 1
     for d and q; channel: (r,) "u", "sum" or "torque"; ok: (r,) bool, rows that are used.
-    electrical: effects whose formula acts on the voltage.
+    electrical: effects whose formula acts on the voltage; free: (effect, coefficient) of the free columns.
     """
 
     y: np.ndarray
@@ -49,6 +50,7 @@ class Cells:
     channel: np.ndarray
     ok: np.ndarray
     electrical: frozenset[str] = frozenset()
+    free: frozenset[tuple] = frozenset()
 
 
 class Projector:
@@ -143,29 +145,31 @@ class Projector:
 
 
 def cells_of(view, effects, projector=None) -> Cells:
-    """Cells of a view with the columns of the effects; free columns have a leading '~'.
+    """Cells of a view with the columns of the effects.
 
     projector: that of a view of the same blocks, or None.
     """
     p = projector or Projector(view)
-    columns, electrical = columns_of(view, effects, p)
-    return Cells(p.rows(misfit(view)), columns, p.block, p.order, p.part, p.channel, p.ok, electrical)
+    columns, electrical, free = columns_of(view, effects, p)
+    return Cells(p.rows(misfit(view)), columns, p.block, p.order, p.part, p.channel, p.ok, electrical, free)
 
 
-def columns_of(view, effects, projector) -> tuple[dict[str, dict[str, np.ndarray]], frozenset[str]]:
-    """Columns {effect: {coefficient: (r,)}} as in ``cells_of``, and the effects whose formula acts on the voltage."""
-    raw, shown, electrical = {}, {}, set()
+def columns_of(view, effects, projector) -> tuple[dict[str, dict], frozenset[str], frozenset[tuple]]:
+    """(columns {effect: {coefficient: (r,)}}, electrical, free) as in Cells."""
+    raw, shown, electrical, free = {}, {}, set(), set()
     for effect in effects:
         shown[effect.name] = view.shows(effect)[projector.block]
         core = effect.core(view)
         if any("u" in column for column in core.values()):
             electrical.add(effect.name)
         raw |= {(effect.name, key): column for key, column in core.items()}
-        raw |= {(effect.name, f"~{key}"): column for key, column in effect.free(view).items()}
+        further = {(effect.name, key): column for key, column in free_columns(effect, view).items()}
+        free |= further.keys()
+        raw |= further
     columns = {name: {} for name in shown}
     for (name, key), column in zip(raw, projector.all_rows(list(raw.values())), strict=True):
         columns[name][key] = column * shown[name]
-    return columns, frozenset(electrical)
+    return columns, frozenset(electrical), frozenset(free)
 
 
 def voltage_level(view):

@@ -12,7 +12,7 @@ import dataclasses
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import flux
+from fluxproof.diagnosis.effects import Described, flux
 from fluxproof.diagnosis.ground.plant_section import plant_of
 from fluxproof.plant import flux_from_currents, machine_params
 from fluxproof.plant.jit import njit
@@ -22,13 +22,14 @@ BENDS = ("saturation_d_per_a2", "saturation_q_per_a2", "cross_saturation_wb_per_
 
 
 def described(view) -> dict[str, np.ndarray]:
-    """Values {channel: array} that the drive file adds to those of its linear machine (see effect.py)."""
+    """Values {channel: array} that the drive file adds to those of its linear machine (see effects/columns.py)."""
     if not view.nominal.plant and not any(getattr(view.machine, key, None) for key in BENDS + LOSSES):
         return {}
     if not view.catalogue:
         raise ValueError("a view of a drive file with physics beyond a linear machine needs the catalogue of effects")
     plant, out = plant_of(view.nominal), {}
-    parts = [effect.given(view, plant) for effect in view.visible(view.catalogue).values()]
+    effects = [effect for effect in view.visible(view.catalogue).values() if isinstance(effect, Described)]
+    parts = [effect.given(view, plant) for effect in effects]
     if any(getattr(plant.machine, key) for key in BENDS):
         parts.append(bent(view, plant.machine))
     for part in parts:

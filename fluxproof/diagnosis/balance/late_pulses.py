@@ -15,6 +15,8 @@ beyond the slope of the zero vector; before the valley the same of the period th
 import numpy as np
 
 from fluxproof.diagnosis.balance.misfit import misfit
+from fluxproof.diagnosis.ground.machine import current_of_flux
+from fluxproof.plant.transforms import space_vector
 
 ORDERS = (3.0, -3.0, 6.0, -6.0)  # electrical, at which the ripple differs from a mean voltage that is late
 ENOUGH = 40  # blocks that are looked at
@@ -28,9 +30,9 @@ def high(duty, at):
 
 def _current(view, legs):
     """Current (b, m+1) in dq [A] of legs that are high for (b, m+1, 3) periods."""
-    volts = (2 / 3) * (legs @ np.exp(2j * np.pi / 3 * np.arange(3))) * view.u_dc.mean(axis=1)[:, None]
+    volts = space_vector(legs) * view.u_dc.mean(axis=1)[:, None]
     psi, m = volts * view.sample_time_s * np.conj(view.turn), view.machine
-    return psi.real / (m.inductance_d_h + view.delta_l[0]) + 1j * psi.imag / (m.inductance_q_h + view.delta_l[1])
+    return current_of_flux(psi, m.inductance_d_h + view.delta_l[0], m.inductance_q_h + view.delta_l[1])
 
 
 def late_ripple(view, late):

@@ -18,11 +18,11 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.balance.described import described
-from fluxproof.diagnosis.effects.effect import torque_of
+from fluxproof.diagnosis.effects import torque_of
 
 
 def misfit(view) -> dict[str, np.ndarray]:
-    """Recorded minus nominal values, {channel: array} (see effect.py)."""
+    """Recorded minus nominal values, {channel: array} (see effects/columns.py)."""
     m = view.machine
     exact = view.with_raw_current()
     r = np.full(len(view), m.resistance_ohm)

@@ -20,6 +20,7 @@ from fluxproof.diagnosis.balance.slow_stretches import (
     known_voltage,
     operating_columns,
 )
+from fluxproof.diagnosis.ground.machine import steady_voltage
 from fluxproof.diagnosis.ground.nominal import flux_level
 from fluxproof.diagnosis.ground.recording import RecordingError
 
@@ -36,8 +37,7 @@ def point_rows(recording, nominal) -> Stretches:
     """
     r, m = recording, nominal.machine
     i, u, omega, u_dc = operating_columns(recording, nominal)
-    psi = m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag
-    nominal_u = m.resistance_ohm * i + 1j * omega * psi
+    nominal_u = steady_voltage(m, i, omega)
     u, both_axes = known_voltage(u, nominal_u)
     good = r.usable & np.isfinite(u) & np.isfinite(nominal_u)
     at_rest = np.abs(omega) < STANDSTILL * nominal.inverter.dc_bus_v / flux_level(m)

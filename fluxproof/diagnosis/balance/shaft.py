@@ -15,6 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.machine import airgap_torque, flux_linkage
+
 FREE_RATIO = (0.7, 1.35)  # median of torque change over inertial change
 REACH, LAG = 80, 200  # samples: half window of the slope, and interval of a change
 FREE = ("loaded", "unloaded", "free")  # kinds whose acceleration is computed from the codes of the angle
@@ -68,9 +70,7 @@ def shaft_kind(recording, nominal, i_s, theta, linked) -> str:
 
 def airgap(nominal, i):
     """Air-gap torque [Nm] of the nominal machine for dq currents, complex [A]."""
-    m = nominal.machine
-    psi = m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag
-    return 1.5 * m.pole_pairs * (np.conj(psi) * i).imag
+    return airgap_torque(nominal.machine, flux_linkage(nominal.machine, i), i)
 
 
 def is_airgap(torque, nominal_airgap, drag) -> bool:

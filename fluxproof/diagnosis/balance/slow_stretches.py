@@ -17,7 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fluxproof.diagnosis.ground.arrays import Complex
+from fluxproof.diagnosis.ground.machine import steady_voltage
 from fluxproof.diagnosis.ground.recording import Recording, RecordingError
+from fluxproof.plant.transforms import space_vector
 
 SIGNALS = ("i_d", "i_q", "u_d", "u_q", "omega")
 STILL = 0.015  # of the largest voltage: largest change of nominal and recorded voltage
@@ -105,7 +107,7 @@ def _operating_points(found, nominal) -> int:
 
 def stretches_of(recording, nominal, least_s) -> Stretches:
     """The stretches of at least ``least_s`` [s]."""
-    r, m = recording, nominal.machine
+    r = recording
     i, u, omega, u_dc = operating_columns(recording, nominal)
     t = r["t"] - r["t"][0]
     parts = dict(zip(SIGNALS, (i.real, i.imag, u.real, u.imag, omega), strict=True))
@@ -119,8 +121,7 @@ def stretches_of(recording, nominal, least_s) -> Stretches:
     change, turns = _change, TURNS
     if max(periods.values()) < MESSAGE_ROWS * np.median(np.diff(t)):  # no messages: every row has its own noise
         change, turns = _drift, FEW_TURNS
-    psi = m.inductance_d_h * i.real + m.magnet_flux_wb + 1j * m.inductance_q_h * i.imag
-    nominal_u = m.resistance_ohm * i + 1j * omega * psi
+    nominal_u = steady_voltage(nominal.machine, i, omega)
     u, both_axes = known_voltage(u, nominal_u)
     angle = known_angle(recording)
     limit = STILL * max(np.nanmax(np.abs(nominal_u)), np.nanmax(np.abs(u)), 1e-9)
@@ -206,12 +207,11 @@ def operating_columns(recording: Recording, nominal):
         raise RecordingError(f"{r.source}: a slow recording needs the speed omega_e: its angle is sampled too rarely")
     omega = r["omega_e"]
     u_dc = r["u_dc"] if r.has("u_dc") else np.full(len(r), float(nominal.inverter.dc_bus_v))
-    turns = np.exp(2j * np.pi / 3 * np.arange(3))
     if r.has("i_d", "i_q"):
         i = r["i_d"] + 1j * r["i_q"]
     elif r.has("i_a", "i_b", "theta_e"):
         third = r["i_c"] if r.has("i_c") else -r["i_a"] - r["i_b"]
-        i = (2 / 3) * (np.stack([r["i_a"], r["i_b"], third], axis=1) @ turns) * np.exp(-1j * r["theta_e"])
+        i = space_vector(np.stack([r["i_a"], r["i_b"], third], axis=1)) * np.exp(-1j * r["theta_e"])
     else:
         raise RecordingError(f"{r.source}: i_d, i_q or i_a, i_b with theta_e are needed")
     if r.has("u_q_ref") and not r.has("d_a", "d_b", "d_c", "theta_e"):
@@ -223,7 +223,7 @@ def operating_columns(recording: Recording, nominal):
         raise RecordingError(f"{r.source}: u_d_ref, u_q_ref or d_a, d_b, d_c with theta_e are needed")
     ahead = (nominal.control.duty_applied_after_samples + 0.5) * nominal.sample_time_s * omega
     duties = np.stack([r["d_a"], r["d_b"], r["d_c"]], axis=1)
-    return i, (2 / 3) * (duties @ turns) * u_dc * np.exp(-1j * (r["theta_e"] + ahead)), omega, u_dc
+    return i, space_vector(duties) * u_dc * np.exp(-1j * (r["theta_e"] + ahead)), omega, u_dc
 
 
 def message_period(t, x) -> float:

@@ -25,6 +25,7 @@ from fluxproof.diagnosis.balance.view import STACKED, View, lacking
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.arrays import Complex
 from fluxproof.diagnosis.ground.recording import Recording
+from fluxproof.plant.transforms import phase_values, space_vector
 
 ROWS = 36  # one turn in steps of ten degrees: the mean inverter loss is accurate to 0.1 %
 BIN_CURRENT, BIN_SPEED = 0.05, 0.05  # of rated current and of the largest speed: the same operating point
@@ -88,12 +89,10 @@ class SlowView(View):
         return np.where(np.isfinite(rest), rest, turn[None, :])
 
     def phases(self, i_dq):
-        turns = np.exp(-2j * np.pi / 3 * np.arange(3))
-        return ((i_dq * np.exp(1j * self._turn(i_dq.shape[1])))[..., None] * turns).real
+        return phase_values(i_dq * np.exp(1j * self._turn(i_dq.shape[1])))
 
     def from_phases(self, abc):
-        stator = (2 / 3) * (abc @ np.exp(2j * np.pi / 3 * np.arange(3)))
-        return stator * np.exp(-1j * self._turn(abc.shape[1]))
+        return space_vector(abc) * np.exp(-1j * self._turn(abc.shape[1]))
 
 
 def slow_view(recording: Recording, nominal, catalogue: dict | None = None) -> SlowView:

@@ -18,7 +18,9 @@ from fluxproof.diagnosis.balance.curves import parabola
 from fluxproof.diagnosis.balance.shaft import FREE
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.arrays import Complex
+from fluxproof.diagnosis.ground.machine import flux_linkage, flux_of_current, mean_emf
 from fluxproof.diagnosis.ground.nominal import Nominal
+from fluxproof.plant.transforms import phase_values, space_vector
 
 # What is computed from the angle alone stays known in a copy with the same angle.
 OF_THE_ANGLE = ("half_turn", "mid_turn", "turn", "theta_mid", "interval_angle")
@@ -162,8 +164,7 @@ class View:
     @cached_property
     def nominal_psi(self):
         """Nominal flux linkage of the current, (b, m+1) complex dq [Wb]."""
-        m = self.machine
-        return m.inductance_d_h * self.i.real + 1j * m.inductance_q_h * self.i.imag + m.magnet_flux_wb
+        return flux_linkage(self.machine, self.i)
 
     @property
     def psi(self):
@@ -173,14 +174,14 @@ class View:
     def inductances(self, i):
         """L_d i_d + j L_q i_q [Wb] of a dq current, with the inductance errors found so far."""
         m, (more_d, more_q) = self.machine, self.delta_l
-        return (m.inductance_d_h + more_d) * i.real + 1j * (m.inductance_q_h + more_q) * i.imag
+        return flux_of_current(i, m.inductance_d_h + more_d, m.inductance_q_h + more_q)
 
     @cached_property
     def duties(self):
         """Duties of the legs in the intervals -1 .. m, (b, m+2, 3), without noise."""
         turn = np.exp(1j * self.interval_angle)
         u: Complex = parabola(self.u * np.conj(turn)) * turn / self.u_dc.mean(axis=1)[:, None]
-        legs = (u[..., None] * np.exp(-2j * np.pi / 3 * np.arange(3))).real
+        legs = phase_values(u)
         if self.mean_duty is None:
             mean = 0.5 - 0.5 * (legs.max(axis=2) + legs.min(axis=2))
         else:
@@ -216,10 +217,9 @@ class View:
             i_raw = self.i_raw - self.stator(self.from_phases(error))
             i_abc = None if self.i_abc is None else self.i_abc - error
             return self.replace(i=i, i_raw=i_raw, i_abc=i_abc)
-        turns = np.exp(2j * np.pi / 3 * np.arange(3))
-        measured = self.i_abc if self.i_abc is not None else (self.i_raw[..., None] * np.conj(turns)).real
+        measured = self.i_abc if self.i_abc is not None else phase_values(self.i_raw)
         mended = measured / raw_gain
-        i_raw = (2 / 3) * (mended @ turns) * (1.0 - 1j * turn)
+        i_raw = space_vector(mended) * (1.0 - 1j * turn)
         return self.replace(i=i, i_raw=i_raw, i_abc=None if self.i_abc is None else mended)
 
     def with_raw_current(self):
@@ -233,18 +233,15 @@ class View:
     def flux(self, psi):
         """Mean EMF of a dq flux linkage given at the samples: (b, m+1) [Wb] to (b, m) complex dq [V]."""
         half = self.half_turn
-        return (half * psi[:, 1:] - np.conj(half) * psi[:, :-1]) / self.sample_time_s
+        return mean_emf((psi[:, :-1], psi[:, 1:]), (np.conj(half), half), self.sample_time_s)
 
     def phases(self, i_dq):
         """Phase values (b, k, 3) of a dq quantity at the samples (k = m+1) or the intervals (k = m)."""
-        stator = i_dq * (self.turn if i_dq.shape[1] == self.theta.shape[1] else self.mid_turn)
-        turns = np.exp(-2j * np.pi / 3 * np.arange(3))
-        return (stator[..., None] * turns).real
+        return phase_values(i_dq * (self.turn if i_dq.shape[1] == self.theta.shape[1] else self.mid_turn))
 
     def from_phases(self, abc):
         """dq value of phase values (b, k, 3), amplitude-invariant Clarke."""
-        stator = (2 / 3) * (abc @ np.exp(2j * np.pi / 3 * np.arange(3)))
-        return stator * np.conj(self.turn if abc.shape[1] == self.theta.shape[1] else self.mid_turn)
+        return space_vector(abc) * np.conj(self.turn if abc.shape[1] == self.theta.shape[1] else self.mid_turn)
 
     def replace(self, **changes):
         """A copy with other arrays."""

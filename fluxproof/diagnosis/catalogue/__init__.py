@@ -4,7 +4,7 @@
 import importlib
 import pkgutil
 
-from fluxproof.diagnosis.effects.effect import Effect
+from fluxproof.diagnosis.effects import Effect
 
 
 def found_in(package: str, path) -> dict[str, Effect]:

@@ -4,7 +4,8 @@
 import numpy as np
 
 from fluxproof.diagnosis.balance.torque_order import log_prior, repeating_order
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, rated_torque
+from fluxproof.diagnosis.effects import Chosen, Described, FreeCurve, Orders, Parameter, ShaftTorque, Wave
+from fluxproof.diagnosis.ground.machine import rated_torque
 from fluxproof.diagnosis.ground.result import Estimate
 
 
@@ -25,12 +26,12 @@ def _waves(view, n):
     h = n / view.machine.pole_pairs
     seen = _seen(view, h)
     return {
-        f"n{n}_cos": {"torque": seen * np.cos(h * view.theta_mid)},
-        f"n{n}_sin": {"torque": seen * np.sin(h * view.theta_mid)},
+        Wave(n, "cos"): {"torque": seen * np.cos(h * view.theta_mid)},
+        Wave(n, "sin"): {"torque": seen * np.sin(h * view.theta_mid)},
     }
 
 
-class Cogging(Effect):
+class Cogging(ShaftTorque, FreeCurve, Chosen, Described):
     def core(self, view):
         n = repeating_order(view)
         return {**_waves(view, n), **_waves(view, 2 * n)}
@@ -42,10 +43,10 @@ class Cogging(Effect):
         return log_prior(view)
 
     def floor(self, nominal):
-        return 0.006 * rated_torque(nominal)
+        return 0.006 * rated_torque(nominal.machine)
 
     def ceiling(self, nominal):
-        return 0.6 * rated_torque(nominal)
+        return 0.6 * rated_torque(nominal.machine)
 
     def size(self, c, nominal):
         return float(np.sqrt(sum(v**2 for v in c.values())))
@@ -53,14 +54,14 @@ class Cogging(Effect):
     @staticmethod
     def _orders(c):
         """{order: (amplitude, phase)} per mechanical turn, T = a sin(n theta_m + phi)."""
-        orders = sorted({int(name[1 : name.index("_")]) for name in c})
-        pairs = {n: (c[f"n{n}_cos"], c[f"n{n}_sin"]) for n in orders}
+        orders = sorted({wave.order for wave in c})
+        pairs = {n: (c[Wave(n, "cos")], c[Wave(n, "sin")]) for n in orders}
         return {n: (float(np.hypot(a, b)), float(np.arctan2(a, b))) for n, (a, b) in pairs.items()}
 
     def estimates(self, c, covariance, nominal):
         sizes = self._orders(c)
         n = max(sizes, key=lambda n: sizes[n][0])
-        k = list(c).index(f"n{n}_cos")
+        k = list(c).index(Wave(n, "cos"))
         spread = float(np.sqrt(0.5 * (covariance[k, k] + covariance[k + 1, k + 1])))
         return {"cogging_nm": Estimate(sizes[n][0], spread, "Nm"), "cogging_order": Estimate(float(n), 0.0, "per turn")}
 
@@ -87,13 +88,11 @@ EFFECT = Cogging(
     title="cogging torque",
     equation="T = T_airgap + a sin(n theta_m + phi), n a multiple of slots and poles",
     signature="torque and speed at whole orders per mechanical turn, present without current",
-    confounders=("emf_harmonics", "current_offset"),
     separated_by="a slow turn without current",
     parameters=(
         Parameter("cogging_nm", "Nm", "amplitude of the largest order", "amplitude"),
         Parameter("cogging_order", "per turn", "the largest order, per mechanical turn", "order"),
     ),
-    mechanical=True,
-    shows_at=(),
     needs=("harmonics",),
+    shows_at=Orders(electrical=()),
 )

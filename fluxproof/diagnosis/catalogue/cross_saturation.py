@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import FluxEffect, Parameter
+from fluxproof.diagnosis.effects import BentFlux, Parameter
 from fluxproof.diagnosis.ground.result import Estimate
 
 
@@ -15,7 +15,7 @@ def _mixed(view, slope_d, slope_q):
     return scale * (slope_d(x, y) + 1j * slope_q(x, y))
 
 
-class CrossSaturation(FluxEffect):
+class CrossSaturation(BentFlux):
     def core_psi(self, view):
         return {"xy2": _mixed(view, lambda x, y: y**2, lambda x, y: 2 * x * y)}
 
@@ -62,9 +62,6 @@ EFFECT = CrossSaturation(
     title="cross-saturation of the axes",
     equation="psi_d = L_d i_d + psi_m - c i_q^2, psi_q = L_q i_q - 2 c i_d i_q (one co-energy)",
     signature="order 0, in proportion to the speed: omega i_q^2 on the q axis, even in i_q; omega i_d i_q on d",
-    confounders=("inductance_d", "magnet_flux", "current_scale", "saturation"),
-    map_shapes=("separable", "full"),
     separated_by="a grid of i_d and i_q that includes i_q = 0",
     parameters=(Parameter("cross_saturation_wb_per_a2", "Wb/A2", "c at rated i_q", "coefficient"),),
-    bends=True,
 )

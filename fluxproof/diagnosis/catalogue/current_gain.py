@@ -3,8 +3,18 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, current_error, phase_error, sigma
+from fluxproof.diagnosis.effects import (
+    DOUBT,
+    FreeCurve,
+    MeasurementError,
+    Orders,
+    Parameter,
+    current_error,
+    phase_error,
+    sigma,
+)
 from fluxproof.diagnosis.ground.result import Estimate
+from fluxproof.plant.transforms import PATTERNS
 
 # Gains of two sensors that differ by g cause a harmonic of 0.58 g and a rotation of 0.29 g; twice that is allowed.
 MOST_TURN = 1 / 3
@@ -12,7 +22,6 @@ MOST_TURN = 1 / 3
 # the coefficients by which they may differ from that, and of its rotation, which three sensors do not have.
 PAIR = {"alpha": 1.5, "beta": -(0.75**0.5), "turn": 12**-0.5}
 UNLIKE_PAIR, TURNED = 0.2, 0.5
-PATTERNS = {"alpha": (2 / 3, -1 / 3, -1 / 3), "beta": (0.0, 3**-0.5, -(3**-0.5))}
 
 
 def gain_column(view, weights):
@@ -20,7 +29,7 @@ def gain_column(view, weights):
     return phase_error(view, view.phases(view.i) * np.array(weights))
 
 
-class CurrentGain(Effect):
+class CurrentGain(MeasurementError, FreeCurve):
     def core(self, view):
         return {name: gain_column(view, w) for name, w in PATTERNS.items()}
 
@@ -84,13 +93,10 @@ EFFECT = CurrentGain(
     title="unequal gains of the current sensors",
     equation="i_measured = (1 + g_abc) i",
     signature="order 2 in dq, in proportion to the current; phase currents that do not sum to zero",
-    confounders=("phase_resistance_asymmetry", "inductance_d", "current_scale"),
     separated_by="a sweep of the speed: the sensors' error also follows omega L i; the sum of three measured currents",
     parameters=tuple(Parameter(f"gain_{x}", "1", f"relative error of phase {x}", f"phase {x}") for x in "abc"),
-    shows_at=(2.0,),
     plausible={f"gain_{x}": (-0.1, 0.1) for x in "abc"},
     otherwise="a shunt of another value, a wrong scale of one column, or a converter that clips",
-    corrects=True,
-    stays="an error of measurement is in the recording itself; the trims act from the next one on",
     needs=("harmonics", "current"),
+    shows_at=Orders((2.0,)),
 )

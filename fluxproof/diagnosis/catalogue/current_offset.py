@@ -3,15 +3,16 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error
+from fluxproof.diagnosis.effects import Caveat, FreeCurve, MeasurementError, Orders, Parameter, current_error
 from fluxproof.diagnosis.ground.result import Estimate
+from fluxproof.plant.transforms import AXES, PATTERNS
 
 PHASES = "abc"
 
 
 def _unit(view, k):
     """One ampere in phase k, in dq at the samples."""
-    return (2 / 3) * np.exp(2j * np.pi / 3 * k) * np.exp(-1j * view.theta)
+    return (2 / 3) * AXES[k] * np.exp(-1j * view.theta)
 
 
 def offset_column(view, weights, course=1.0):
@@ -24,12 +25,12 @@ def offset_column(view, weights, course=1.0):
 
 
 # The common mode appears in the sum only; in dq the other two rotate at the electrical frequency.
-PATTERNS = {"alpha": (2 / 3, -1 / 3, -1 / 3), "beta": (0.0, 3**-0.5, -(3**-0.5)), "zero": (1.0, 1.0, 1.0)}
+OFFSETS = {**PATTERNS, "zero": (1.0, 1.0, 1.0)}
 
 
-class CurrentOffset(Effect):
+class CurrentOffset(MeasurementError, FreeCurve, Caveat):
     def _patterns(self, view):
-        return {k: w for k, w in PATTERNS.items() if k != "zero" or view.has_sum}
+        return {k: w for k, w in OFFSETS.items() if k != "zero" or view.has_sum}
 
     def core(self, view):
         return {name: offset_column(view, w) for name, w in self._patterns(view).items()}
@@ -49,7 +50,7 @@ class CurrentOffset(Effect):
 
     @staticmethod
     def _phases(c, suffix="") -> np.ndarray:
-        return sum((c.get(name + suffix, 0.0) * np.array(w) for name, w in PATTERNS.items()), np.zeros(3))
+        return sum((c.get(name + suffix, 0.0) * np.array(w) for name, w in OFFSETS.items()), np.zeros(3))
 
     def corrected(self, view, c):
         course = view.course[:, None, None]
@@ -61,7 +62,7 @@ class CurrentOffset(Effect):
         names = list(c)
         out = {}
         for k, phase in enumerate(PHASES):
-            weights = np.array([PATTERNS[name][k] if name in PATTERNS else 0.0 for name in names])
+            weights = np.array([OFFSETS[name][k] if name in OFFSETS else 0.0 for name in names])
             spread = float(np.sqrt(max(weights @ covariance @ weights, 0.0)))
             out[f"offset_{phase}_a"] = Estimate(float(self._phases(c)[k]), spread, "A")
         return out
@@ -83,13 +84,10 @@ EFFECT = CurrentOffset(
     title="offsets of the current sensors",
     equation="i_measured = i + o_abc",
     signature="order 1 in dq (R o, constant in the stator frame); phase currents that do not sum to zero",
-    confounders=("encoder_eccentricity", "phase_resistance_asymmetry"),
     separated_by="a log at zero current, gates off",
     parameters=tuple(Parameter(f"offset_{x}_a", "A", f"phase {x}, measured minus true", f"phase {x}") for x in PHASES),
-    corrects=True,
-    stays="an error of measurement is in the recording itself; the trims act from the next one on",
-    shows_at=(1.0,),
     plausible={f"offset_{x}_a": (-0.1, 0.1, "machine.rated_current_a") for x in PHASES},
     otherwise="a wrong offset code, or a magnetised current sensor",
     needs=("harmonics", "current"),
+    shows_at=Orders((1.0,)),
 )

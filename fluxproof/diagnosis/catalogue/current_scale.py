@@ -8,7 +8,7 @@ linear in it at any size; the scale is s = a / (1 - a).
 import numpy as np
 
 from fluxproof.diagnosis.catalogue.current_gain import gain_column
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, sigma
+from fluxproof.diagnosis.effects import Constant, FreeCurve, MeasurementError, Parameter, current_error, one, sigma
 
 LARGEST_SCALE, SMALLEST_SCALE = 2.5, -0.75  # the sensors of a drive that runs are right within a factor of 3.5
 
@@ -17,7 +17,9 @@ def _scale(c) -> float:
     return c["share"] / (1.0 - c["share"])
 
 
-class CurrentScale(Effect):
+class CurrentScale(MeasurementError, FreeCurve, Constant):
+    rescales = ("i",)
+
     def core(self, view):
         column = gain_column(view, (1.0, 1.0, 1.0)) if view.has_sum else current_error(view, view.i)
         return {"share": {channel: x / view.current_kept for channel, x in column.items()}}
@@ -57,13 +59,8 @@ EFFECT = CurrentScale(
     title="common gain error of the current sensors",
     equation="i_measured = (1 + s) i",
     signature="R, L_d and L_q wrong by the same factor",
-    confounders=("resistance", "inductance_d", "inductance_q", "cross_saturation"),
-    rescales=("i",),
-    exact=True,
     separated_by="an external ammeter or a torque transducer",
     parameters=(Parameter("scale", "1", "relative error of all phases", "error"),),
-    corrects=True,
-    stays="an error of measurement is in the recording itself; the trims act from the next one on",
     plausible={"scale": (-0.1, 0.1)},
     otherwise="rms values in place of peak values, or the scale of another range of the sensors",
     needs=("current",),

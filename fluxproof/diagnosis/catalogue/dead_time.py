@@ -5,7 +5,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, voltage, zero_vector_slope
+from fluxproof.diagnosis.effects import (
+    DOUBT,
+    Caveat,
+    Described,
+    FreeCurve,
+    LegLoss,
+    Orders,
+    Parameter,
+    voltage,
+    zero_vector_slope,
+)
 from fluxproof.diagnosis.ground.result import Estimate
 
 # No width is so large that the curve would resemble a resistance over most of the current range.
@@ -14,7 +24,6 @@ KNOTS = (0.0, 0.005, 0.02, 0.05, 0.12)  # of rated current: ends of the bumps of
 DROP = 0.05  # of rated current: where device drops have reached their full value
 STILL_GROWS = (0.12, 0.3)  # of rated current: growth beyond this range counts as resistance
 RIPPLE = 1 / 32  # of u_dc T / L: a quarter of the largest current ripple
-TAILS = {"log": -np.log(KNOTS[-1]), "fade": 1.0 - KNOTS[-1]}  # of device_tails at rated current
 TOLD = 0.05  # of the winding resistance: a steeper rise of the loss is reported, because it looks like resistance
 CLAMPED = 0.1  # uncertainty, as a share of the loss, while ripple decides which diode conducts
 
@@ -43,67 +52,58 @@ def _following_bus(view, columns):
     return {name: voltage(column["u"] * factor) for name, column in columns.items()}
 
 
-def _at_full(c):
-    """Weights of the coefficients in the full loss, in their order."""
-    return np.array([full_loss({key: 1.0}) for key in c])
+def _ramp(width) -> Callable:
+    return lambda x: np.clip(x / width, -1.0, 1.0)
+
+
+def _bump(knot) -> Callable:
+    k = KNOTS.index(knot)
+    return lambda x: np.sign(x) * np.interp(np.abs(x), KNOTS[k - 1 : k + 2], (0.0, 1.0, 0.0))
+
+
+# {coefficient: loss of a leg as a function of its current in per unit of rated}
+WIDTH_OF = {f"v_{w:g}": w for w in WIDTHS}
+RAMPS = {key: _ramp(w) for key, w in WIDTH_OF.items()}
+# Bumps instead of more ramps: a ramp between two others is nearly their mean.
+BUMPS = {f"bump_{knot:g}": _bump(knot) for knot in KNOTS[1:-1] if knot not in WIDTHS}
+# Beyond the last knot: growth of any device, a drop in log(i), a commutation loss in 1/i.
+TAILS = {
+    "growth": lambda x: np.sign(x) * np.interp(np.abs(x), STILL_GROWS, (0.0, 1.0)),
+    "log": lambda x: np.sign(x) * np.log(np.maximum(np.abs(x) / KNOTS[-1], 1.0)),
+    "fade": lambda x: np.sign(x) * (1.0 - KNOTS[-1] / np.maximum(np.abs(x), KNOTS[-1])),
+}
+DROPS = {"drop": _ramp(DROP)}  # of devices, which do not depend on the bus voltage
+SHAPES: dict[str, Callable] = {**RAMPS, **BUMPS, **TAILS, **DROPS}
 
 
 def _at(c, x):
-    """Weights of the coefficients in the loss at a current x up to the last knot, per unit of rated, in their order."""
-    shapes = {
-        "v": lambda w: min(x / w, 1.0),
-        "bump": lambda w: _bump(x, _around(w)),
-        "drop": lambda w: min(x / DROP, 1.0),
-    }
-    named = [key.partition("_") for key in c]
-    return np.array([shapes[kind](float(w or 0.0)) if kind in shapes else 0.0 for kind, _, w in named])
-
-
-def _around(knot):
-    """The knot with its neighbours."""
-    k = KNOTS.index(knot)
-    return KNOTS[k - 1 : k + 2]
-
-
-def _bump(x, knots):
-    return np.sign(x) * np.interp(np.abs(x), knots, (0.0, 1.0, 0.0))
-
-
-def device_tails(view):
-    """Columns of device losses beyond the last knot: a drop in log(i), a commutation loss in 1/i."""
-    last = KNOTS[-1]
-    shapes = {
-        "log": lambda x: np.sign(x) * np.log(np.maximum(np.abs(x) / last, 1.0)),
-        "fade": lambda x: np.sign(x) * (1.0 - last / np.maximum(np.abs(x), last)),
-    }
-    return _following_bus(view, _leg_losses(view, shapes))
+    """Weights of the coefficients in the loss at a current x, per unit of rated, in their order."""
+    return np.array([float(SHAPES[key](x)) for key in c])
 
 
 def full_loss(c) -> float:
     """Voltage loss at rated current [V] of coefficients c; the bumps only shape the curve near zero current."""
-    return float(sum(v * TAILS.get(key, key.startswith(("v_", "growth", "drop"))) for key, v in c.items()))
+    return float(sum(v * SHAPES[key](1.0) for key, v in c.items()))
 
 
 def _rise(c) -> float:
     """Growth of the loss [V] from the last knot to rated current."""
-    return c.get("growth", 0.0) + sum(value * c.get(key, 0.0) for key, value in TAILS.items())
+    return sum(c.get(key, 0.0) * TAILS[key](1.0) for key in ("log", "fade", "growth"))
 
 
-class DeadTime(Effect):
+def _half_late(loss, nominal) -> float:
+    """Shift of a pulse's middle [s] by a loss [V]: one edge is late by the whole dead time, the middle by half."""
+    return 0.5 * abs(loss) / nominal.inverter.dc_bus_v * nominal.sample_time_s
+
+
+class DeadTime(LegLoss, FreeCurve, Caveat, Described):
     def core(self, view):
-        ramps = {f"v_{w:g}": lambda x, w=w: np.clip(x / w, -1.0, 1.0) for w in WIDTHS}
-        return _following_bus(view, _leg_losses(view, ramps))
+        return _following_bus(view, _leg_losses(view, RAMPS))
 
     def free(self, view):
-        # Bumps instead of more ramps: a ramp between two others is nearly their mean.
-        places = [k for k in range(1, len(KNOTS) - 1) if KNOTS[k] not in WIDTHS]
-        shapes: dict[str, Callable] = {f"bump_{KNOTS[k]:g}": lambda x, k=k: _bump(x, _around(KNOTS[k])) for k in places}
-        shapes["growth"] = lambda x: np.sign(x) * np.interp(np.abs(x), STILL_GROWS, (0.0, 1.0))
-        out = _following_bus(view, _leg_losses(view, shapes))
-        out |= device_tails(view)
+        out = _following_bus(view, _leg_losses(view, BUMPS | TAILS))
         if np.ptp(view.u_dc.mean(axis=1)) > 0.04 * view.nominal.inverter.dc_bus_v:
-            # Device drops do not depend on the bus voltage.
-            out |= _leg_losses(view, {"drop": lambda x: np.clip(x / DROP, -1.0, 1.0)})
+            out |= _leg_losses(view, DROPS)
         return out
 
     def possible(self, c, covariance, nominal):
@@ -112,7 +112,7 @@ class DeadTime(Effect):
         Within the ripple of the current a pulse may end as if the current had either sign: there a gain up to the full
         loss is possible.
         """
-        values, full = np.array(list(c.values())), _at_full(c)
+        values, full = np.array(list(c.values())), _at(c, 1.0)
         reach = self.reach(c, nominal) / nominal.machine.rated_current_a
         most = abs(full @ values)
         for weights, least in ((full, 0.0), *((_at(c, x), -most if x <= reach else 0.0) for x in KNOTS[1:])):
@@ -121,8 +121,7 @@ class DeadTime(Effect):
         return True
 
     def late_s(self, c, nominal):
-        """One edge of every pulse is late by the whole dead time, its middle by half."""
-        return 0.5 * abs(full_loss(c)) / nominal.inverter.dc_bus_v * nominal.sample_time_s
+        return _half_late(full_loss(c), nominal)
 
     def floor(self, nominal):
         return 0.0002 * nominal.inverter.dc_bus_v
@@ -144,7 +143,7 @@ class DeadTime(Effect):
         return nominal.sample_time_s * volts / min(m.inductance_d_h, m.inductance_q_h)
 
     def estimates(self, c, covariance, nominal):
-        at_full = _at_full(c)
+        at_full = _at(c, 1.0)
         # A loss that still grows towards rated current may belong to a resistance.
         spread = float(np.hypot(np.sqrt(max(at_full @ covariance @ at_full, 0.0)), _rise(c)))
         return {"v_dead_v": Estimate(full_loss(c), spread, "V")}
@@ -162,13 +161,13 @@ class DeadTime(Effect):
         if not view.nominal.plant.get("inverter", {}).get("dead_time_s"):
             return {}  # in the core's own section it is a command to the gates, which the duties may contain
         width = max(plant.inverter.zero_current_a / view.machine.rated_current_a, 1e-3)
-        late = view.replace(late_s=view.late_s + self.late_s({"v_": loss}, view.nominal))
-        ramp = {"all": lambda x: loss * np.clip(x / width, -1.0, 1.0)}
-        return _following_bus(late, _leg_losses(late, ramp))["all"]
+        late = view.replace(late_s=view.late_s + _half_late(loss, view.nominal))
+        column = _leg_losses(late, {"all": lambda x: loss * _ramp(width)(x)})
+        return _following_bus(late, column)["all"]
 
     def plant(self, c, nominal):
         v_dead = max(0.0, full_loss(c))
-        ramps = {float(k[2:]): abs(v) for k, v in c.items() if k.startswith("v_")}
+        ramps = {width: abs(c.get(key, 0.0)) for key, width in WIDTH_OF.items()}
         zone = sum(w * v for w, v in ramps.items()) / max(sum(ramps.values()), 1e-12)
         return {
             "inverter.dead_time_s": v_dead / nominal.inverter.dc_bus_v / nominal.inverter.pwm_frequency_hz,
@@ -181,16 +180,12 @@ EFFECT = DeadTime(
     title="dead time of the inverter",
     equation="u_x = u_x,ref - v_dead s(i_x), s odd, s = 1 above a small current",
     signature="order 0 in phase with the current, (4/pi) v_dead, and orders 6 and 12; independent of the speed",
-    confounders=("resistance", "emf_harmonics"),
-    beside_map=True,
     separated_by="several currents, i_q reversed; another bus voltage or PWM frequency separates dead time from drops",
     parameters=(
         Parameter("v_dead_v", "V", "loss of a leg at full current, device drops included", "dead-time voltage"),
     ),
-    smoothed=True,
-    trailing=(12.0, 18.0, 24.0),
-    shows_at=(0.0, 6.0, 12.0, 18.0),
     plausible={"v_dead_v": (0.0, 0.06, "inverter.dc_bus_v")},
     otherwise="the dead time is already compensated by the recorded duties, or the bus voltage is wrong",
     needs=("inverter",),
+    shows_at=Orders((0.0, 6.0, 12.0, 18.0), trailing=(12.0, 18.0, 24.0)),
 )

@@ -10,7 +10,16 @@ import numpy as np
 from fluxproof.diagnosis.balance.curves import parabola
 from fluxproof.diagnosis.balance.late_pulses import instant, late_ripple
 from fluxproof.diagnosis.balance.shaft import SHOWN
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, torque_of, voltage
+from fluxproof.diagnosis.effects import (
+    Alternatives,
+    FreeCurve,
+    MeasurementError,
+    Parameter,
+    current_error,
+    one,
+    torque_of,
+    voltage,
+)
 
 MOST_PERIODS = 3.0  # periods; more than is possible, so that the iteration can return
 TRIED, FINE = np.arange(1, 50) / 50, 0.002  # periods, of late pulses
@@ -80,7 +89,9 @@ def _error(view, c):
     return c.get("gates", 0.0) * columns["gates"] + (c.get("shift", 0.0) + c.get("filter", 0.0)) * columns["shift"]
 
 
-class Delay(Effect):
+class Delay(MeasurementError, FreeCurve, Alternatives):
+    one_of = (("tau",), ("gates", "shift", "filter", "torque"))
+
     def core(self, view):
         late = -view.to_dq(_moved(view, 1.0)[:, 1:-1]) / view.sample_time_s
         return {"tau": voltage(late), "gates": self._pulses(view, late, "gates")}
@@ -146,11 +157,7 @@ EFFECT = Delay(
     title="delay of the voltage",
     equation="u(t) = u_recorded(t - tau)",
     signature="order 0: the whole voltage vector rotated by omega tau; orders 3 and 6 of late gates",
-    confounders=("encoder_offset", "sampling_skew", "iron_loss"),
     separated_by="two speeds, both directions; load at each; a step",
     parameters=(Parameter("delay_s", "s", f"beyond {COUNT}", "later by", "earlier by", COUNT),),
-    one_of=(("tau",), ("gates", "shift", "filter", "torque")),
-    corrects=True,
-    stays="an error in time is in the recording itself",
     needs=("samples", "inverter"),
 )

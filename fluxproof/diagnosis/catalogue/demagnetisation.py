@@ -4,10 +4,10 @@
 import numpy as np
 
 from fluxproof.diagnosis.balance.operating_points import instant_of_change, log_prior
-from fluxproof.diagnosis.effects.effect import DOUBT, FluxEffect, Parameter, one, sigma
+from fluxproof.diagnosis.effects import DOUBT, Caveat, Chosen, Constant, FluxEffect, Parameter, one, sigma
 
 
-class Demagnetisation(FluxEffect):
+class Demagnetisation(FluxEffect, Constant, Chosen, Caveat):
     def core_psi(self, view):
         instant = instant_of_change(view)
         lost = np.zeros(len(view)) if instant is None else (view.t >= instant).astype(float)
@@ -39,12 +39,9 @@ EFFECT = Demagnetisation(
     title="sudden loss of magnet flux",
     equation="psi_d = L_d i_d + psi_m + psi_step (t >= t_0)",
     signature="order 0 on the q axis, proportional to speed, from one instant on",
-    confounders=("magnet_temperature", "magnet_flux"),
     separated_by="an operating point without current before and after, and once more when the machine is cold",
     parameters=(Parameter("magnet_flux_step_wb", "Wb", "from one instant on", "change"),),
-    exact=True,
     plausible={"magnet_flux_step_wb": (-0.4, 0.0, "machine.magnet_flux_wb")},
     otherwise="a sensor of current or voltage has changed its scale",
-    stays="a drive file has one magnet flux, and this recording has two",
     needs=("time",),
 )

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, flux, torque_of
+from fluxproof.diagnosis.effects import Described, FreeCurve, Orders, Parameter, Wave, flux, torque_of
 from fluxproof.diagnosis.ground.result import Estimate
 
 
@@ -12,7 +12,7 @@ def _order(view, h):
     psi_m = view.machine.magnet_flux_wb
     turn = np.exp(1j * h * view.theta)
     terms = {"fc": (turn, h), "fs": (1j * turn, h), "bc": (np.conj(turn), -h), "bs": (1j * np.conj(turn), -h)}
-    return {f"h{h}_{key}": _with_reluctance(view, psi_m * term, n) for key, (term, n) in terms.items()}
+    return {Wave(h, key): _with_reluctance(view, psi_m * term, n) for key, (term, n) in terms.items()}
 
 
 def _with_reluctance(view, psi, n):
@@ -24,14 +24,14 @@ def _with_reluctance(view, psi, n):
 
 def _dq(c, h):
     """Amplitudes (a_d, a_q) and phase of plant.Harmonic: a_d cos(h theta + phi), a_q sin(h theta + phi)."""
-    forward = c.get(f"h{h}_fc", 0.0) + 1j * c.get(f"h{h}_fs", 0.0)
-    backward = c.get(f"h{h}_bc", 0.0) + 1j * c.get(f"h{h}_bs", 0.0)
+    fc, fs, bc, bs = (c.get(Wave(h, part), 0.0) for part in ("fc", "fs", "bc", "bs"))
+    forward, backward = fc + 1j * fs, bc + 1j * bs
     d, q = forward + np.conj(backward), forward - np.conj(backward)
     phi = float(np.angle(d if abs(d) >= abs(q) else q))
     return float((d * np.exp(-1j * phi)).real), float((q * np.exp(-1j * phi)).real), phi
 
 
-class EmfHarmonics(Effect):
+class EmfHarmonics(FreeCurve, Described):
     def core(self, view):
         return _order(view, 6)
 
@@ -50,7 +50,7 @@ class EmfHarmonics(Effect):
     def estimates(self, c, covariance, nominal):
         out = {}
         for h in (6, 12):
-            index = [k for k, name in enumerate(c) if name.startswith(f"h{h}_")]
+            index = [k for k, wave in enumerate(c) if wave.order == h]
             if index:
                 values = np.array(list(c.values()))[index]
                 size = float(np.sqrt(np.sum(values**2)))
@@ -72,7 +72,7 @@ class EmfHarmonics(Effect):
     def plant(self, c, nominal):
         rows = []
         for h in (6, 12, 18):
-            if any(name.startswith(f"h{h}_") for name in c):
+            if any(wave.order == h for wave in c):
                 d, q, phi = _dq(c, h)
                 rows.append([float(h), d, q, phi])
         return {"machine.emf_harmonics": rows}
@@ -83,15 +83,13 @@ EFFECT = EmfHarmonics(
     title="harmonics of the magnet flux",
     equation="psi_dq = ... + psi_m sum_h (a_d cos(h theta + phi) + j a_q sin(h theta + phi)), h = 6, 12, 18",
     signature="orders 6 and 12 in dq, proportional to speed, also at zero current",
-    confounders=("dead_time", "cogging"),
     separated_by="two speeds; rotation at zero current",
     parameters=(
         Parameter("order_6", "1", "amplitude relative to the magnet flux", "order 6"),
         Parameter("order_12", "1", "amplitude relative to the magnet flux", "order 12"),
     ),
-    trailing=(12.0, 18.0, 24.0),
-    shows_at=(6.0, 12.0, 18.0),
     plausible={"order_6": (0.0, 0.2), "order_12": (0.0, 0.2)},
     otherwise="a machine for block commutation, or an angle that is not linear over the turn",
     needs=("harmonics",),
+    shows_at=Orders((6.0, 12.0, 18.0), trailing=(12.0, 18.0, 24.0)),
 )

@@ -4,10 +4,23 @@
 import numpy as np
 
 from fluxproof.diagnosis.balance.curves import course
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, angle_error, one, sigma
+from fluxproof.diagnosis.effects import (
+    Constant,
+    FarStart,
+    FreeCurve,
+    MeasurementError,
+    Parameter,
+    angle_error,
+    one,
+    sigma,
+)
 
 
-class EncoderOffset(Effect):
+class EncoderOffset(MeasurementError, FreeCurve, Constant, FarStart):
+    rescales = ("theta_e",)
+    exact = False
+    starts = tuple({"offset": n * np.pi / 4} for n in (-3, -2, -1, 1, 2, 3, 4))
+
     def core(self, view):
         return {"offset": angle_error(view, np.ones_like(view.theta))}
 
@@ -38,12 +51,7 @@ EFFECT = EncoderOffset(
     title="encoder offset",
     equation="theta_measured = theta_e + offset",
     signature="order 0: omega psi_m offset on the d axis, also at zero current",
-    confounders=("inductance_q", "delay", "sampling_skew", "saturation"),
-    rescales=("theta_e",),
     separated_by="rotation at zero current in both directions, two speeds",
     parameters=(Parameter("offset_rad", "rad", "electrical, measured minus true", "offset"),),
-    corrects=True,
-    stays="an error of measurement is in the recording itself; the trims act from the next one on",
     needs=("angle",),
-    starts=tuple({"offset": n * np.pi / 4} for n in (-3, -2, -1, 1, 2, 3, 4)),
 )

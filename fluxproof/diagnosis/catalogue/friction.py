@@ -3,8 +3,10 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, rated_torque
+from fluxproof.diagnosis.effects import DOUBT, FreeCurve, Parameter, ShaftTorque
+from fluxproof.diagnosis.ground.machine import rated_torque
 from fluxproof.diagnosis.ground.result import Estimate
+from fluxproof.plant.transforms import linear_limit
 
 LOW = 0.1  # of top speed: where the friction of a shaft that begins to turn has fallen to 1 / e
 SPEEDS = (0.05, 0.3, 1.0)  # of top speed, at which a drag must not be negative
@@ -19,7 +21,7 @@ def _top(view):
     return max(float(np.abs(view.omega).max()) / view.machine.pole_pairs, 1e-9)
 
 
-class Friction(Effect):
+class Friction(ShaftTorque, FreeCurve):
     def core(self, view):
         top = _top(view)
         return {
@@ -38,21 +40,21 @@ class Friction(Effect):
         return cores.get("viscous" if key == "square" else "coulomb", max(cores.values()))
 
     def floor(self, nominal):
-        return 0.006 * rated_torque(nominal)
+        return 0.006 * rated_torque(nominal.machine)
 
     def ceiling(self, nominal):
-        return rated_torque(nominal)
+        return rated_torque(nominal.machine)
 
     def size(self, c, nominal):
         """Drag torque [Nm] at the speed where the EMF reaches the bus voltage, about the maximum speed."""
         m = nominal.machine
-        top = nominal.inverter.dc_bus_v / np.sqrt(3) / m.magnet_flux_wb / m.pole_pairs
+        top = linear_limit(nominal.inverter.dc_bus_v) / m.magnet_flux_wb / m.pole_pairs
         return abs(c["viscous"]) * top + abs(c["coulomb"]) + abs(c.get("square", 0.0)) * top + abs(c.get("low", 0.0))
 
     def possible(self, c, covariance, nominal):
         """Friction cannot drive the shaft: at no speed up to that of ``size`` the total drag is negative."""
         m = nominal.machine
-        top = nominal.inverter.dc_bus_v / np.sqrt(3) / m.magnet_flux_wb / m.pole_pairs
+        top = linear_limit(nominal.inverter.dc_bus_v) / m.magnet_flux_wb / m.pole_pairs
         values = np.array(list(c.values()))
         for x in SPEEDS:
             grows = {"viscous": x * top, "coulomb": 1.0, "square": x**2 * top, "low": np.exp(-x / LOW)}
@@ -80,12 +82,10 @@ EFFECT = Friction(
     title="friction different from the drive file",
     equation="T_shaft = T_airgap - B omega_m - T_c sign(omega_m)",
     signature="torque against the motion, odd in speed, at every load",
-    confounders=("iron_loss",),
     separated_by="a torque transducer, or a no-load coast-down in both directions",
     parameters=(
         Parameter("viscous_friction_nms", "Nm s", "per mechanical rad/s", "viscous"),
         Parameter("coulomb_friction_nm", "Nm", "dry", "dry"),
     ),
-    mechanical=True,
     needs=("harmonics",),
 )

@@ -3,10 +3,12 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import LEAST_CURRENT, FluxEffect, Parameter, one, sigma
+from fluxproof.diagnosis.effects import LEAST_CURRENT, Constant, FluxEffect, Parameter, Spread, one, sigma
 
 
-class InductanceD(FluxEffect):
+class InductanceD(FluxEffect, Constant, Spread):
+    rescales = ("inductance_d_h",)
+
     def core_psi(self, view):
         return {"delta_l_d": view.i.real.astype(complex)}
 
@@ -41,12 +43,8 @@ EFFECT = InductanceD(
     title="d-axis inductance off the nameplate",
     equation="psi_d = (L_d + delta_l_d) i_d",
     signature="order 0, omega i_d on the q axis; and the slope of i_d",
-    confounders=("magnet_flux", "current_gain", "cross_saturation", "saturation"),
-    rescales=("inductance_d_h",),
-    exact=True,
     separated_by="two non-zero values of i_d",
     parameters=(Parameter("inductance_d_h", "H", "of the d axis", "L_d"),),
-    spreads=True,
     plausible={"inductance_d_h": (0.5, 1.9, "machine.inductance_d_h")},
     otherwise="an inductance between two terminals is twice that of a phase; an incremental one is smaller",
 )

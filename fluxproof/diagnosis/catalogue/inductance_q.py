@@ -3,10 +3,12 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import LEAST_CURRENT, FluxEffect, Parameter, one, sigma
+from fluxproof.diagnosis.effects import LEAST_CURRENT, Constant, FluxEffect, Parameter, Spread, one, sigma
 
 
-class InductanceQ(FluxEffect):
+class InductanceQ(FluxEffect, Constant, Spread):
+    rescales = ("inductance_q_h",)
+
     def core_psi(self, view):
         return {"delta_l_q": 1j * view.i.imag}
 
@@ -41,12 +43,8 @@ EFFECT = InductanceQ(
     title="q-axis inductance off the nameplate",
     equation="psi_q = (L_q + delta_l_q) i_q",
     signature="order 0, -omega i_q on the d axis; and the slope of i_q",
-    confounders=("encoder_offset", "saturation", "iron_loss", "sampling_skew"),
-    rescales=("inductance_q_h",),
-    exact=True,
     separated_by="several i_q of both signs; rotation at zero current",
     parameters=(Parameter("inductance_q_h", "H", "of the q axis", "L_q"),),
-    spreads=True,
     plausible={"inductance_q_h": (0.5, 1.9, "machine.inductance_q_h")},
     otherwise="an inductance between two terminals is twice that of a phase; an incremental one is smaller",
 )

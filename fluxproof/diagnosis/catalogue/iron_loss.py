@@ -6,7 +6,8 @@ The loss current may also lag by a time, as eddy currents do, and then weakens t
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, one, sigma, torque_of
+from fluxproof.diagnosis.effects import DOUBT, Described, FreeCurve, LostFlux, Parameter, one, sigma, torque_of
+from fluxproof.plant.transforms import linear_limit
 
 LAG_S = 1e-4  # time in which eddy currents build up in a lamination of 0.3 mm
 
@@ -36,7 +37,7 @@ def _loss(view, omega):
     return {"u": view.flux(psi), "torque": torque_of(view, psi, view.i) - torque_of(view, view.psi, i_fe)}
 
 
-class IronLoss(Effect):
+class IronLoss(FreeCurve, LostFlux, Described):
     def core(self, view):
         speeds = _speeds(view)
         return {key: _loss(view, speeds[key]) for key in ("g_fe", "g_hysteresis")}
@@ -71,7 +72,7 @@ class IronLoss(Effect):
 
     @staticmethod
     def _rated_emf(nominal):
-        return nominal.inverter.dc_bus_v / np.sqrt(3)
+        return linear_limit(nominal.inverter.dc_bus_v)
 
     @staticmethod
     def _conductance(c):
@@ -102,12 +103,9 @@ EFFECT = IronLoss(
     title="iron loss",
     equation="i = i_m + j omega psi / R_fe",
     signature="order 0: omega^2 L_q psi / R_fe on the d axis, even in speed, and a drag torque",
-    confounders=("sampling_skew", "inductance_q", "resistance", "delay"),
     separated_by="load: omega^2 i_q on the q axis; a shifted sampling trigger; low speed for hysteresis",
     parameters=(
         Parameter("iron_resistance_ohm", "ohm", "parallel to the EMF, at the highest speed", "loss resistance"),
     ),
-    positive=True,
-    takes_flux=True,
     needs=("angle",),
 )

@@ -4,12 +4,15 @@
 import numpy as np
 
 from fluxproof.diagnosis.balance.curves import course
-from fluxproof.diagnosis.effects.effect import DOUBT, FluxEffect, Parameter, one, sigma
+from fluxproof.diagnosis.effects import DOUBT, Constant, FluxEffect, Parameter, Spread, one, sigma
 
 MOST_OF_NAMEPLATE = 2.0  # of the nameplate's flux, by which the true one may differ
 
 
-class MagnetFlux(FluxEffect):
+class MagnetFlux(FluxEffect, Constant, Spread):
+    rescales = ("magnet_flux_wb",)
+    curve = 0.1  # a part of lost flux recovers; more is a drift
+
     def core_psi(self, view):
         return {"delta_psi_m": np.ones_like(view.i)}
 
@@ -31,7 +34,7 @@ class MagnetFlux(FluxEffect):
 
     def too_large(self, c, view):
         most = MOST_OF_NAMEPLATE * view.machine.magnet_flux_wb
-        return self.size(c, view.nominal) > most or self._leaves_nothing(c, view.machine)
+        return self.size(c, view.nominal) > most or self.leaves_nothing(c, view.machine)
 
     def estimates(self, c, covariance, nominal):
         return one("magnet_flux_wb", "Wb", nominal.machine.magnet_flux_wb + c["delta_psi_m"], sigma(covariance))
@@ -45,13 +48,8 @@ EFFECT = MagnetFlux(
     title="magnet flux off the nameplate",
     equation="psi_d = L_d i_d + psi_m + delta_psi_m",
     signature="order 0 on the q axis, proportional to speed, at every current including zero",
-    confounders=("resistance", "cross_saturation", "magnet_temperature", "inductance_d"),
-    rescales=("magnet_flux_wb",),
-    exact=True,
     separated_by="three speeds; rotation at zero current",
     parameters=(Parameter("magnet_flux_wb", "Wb", "peak, per phase", "flux linkage"),),
-    spreads=True,
-    curve=0.1,  # a part of lost flux recovers; more is a drift
     plausible={"magnet_flux_wb": (0.75, 1.25, "machine.magnet_flux_wb")},
     otherwise="a drive file with the value between two terminals (1.73 times) or the rms value (0.71), or lost magnets",
 )

@@ -4,12 +4,14 @@
 import numpy as np
 
 from fluxproof.diagnosis.balance.curves import COURSE_KNOTS, course, courses, step_at_start
-from fluxproof.diagnosis.effects.effect import FluxEffect, Parameter, one, sigma
+from fluxproof.diagnosis.effects import Drift, FluxEffect, Parameter, one, sigma
 
 MOST_AT_ONCE = 4.0  # largest ratio of the step at the start to the later change
 
 
-class MagnetTemperature(FluxEffect):
+class MagnetTemperature(FluxEffect, Drift):
+    drift_of = "magnet_flux"
+
     def core_psi(self, view):
         return {"drift": np.ones_like(view.i) * course(view)}
 
@@ -51,14 +53,11 @@ EFFECT = MagnetTemperature(
     title="temperature drift of the magnet flux",
     equation="psi_d = L_d i_d + psi_m (1 + alpha_m (T_m - T_ref))",
     signature="order 0 on the q axis, proportional to speed, drifting over time",
-    confounders=("magnet_flux", "resistance_temperature"),
     separated_by="hot and cold machine, at two speeds and at zero current",
     parameters=(
         Parameter("magnet_flux_drift_wb", "Wb", "from start to end; the magnet temperature is not measured", "change"),
     ),
     plausible={"magnet_flux_drift_wb": (-0.25, 0.0, "machine.magnet_flux_wb")},
     otherwise="magnets lose 0.05 to 0.2 % of their flux per kelvin: a sensor drifts, or the machine cooled",
-    stays="the temperature of the magnets is not recorded, so that a coefficient cannot be applied",
-    drift_of="magnet_flux",
     needs=("time",),
 )

@@ -4,13 +4,13 @@
 import numpy as np
 
 from fluxproof.diagnosis.balance.curves import course
-from fluxproof.diagnosis.catalogue.current_gain import PATTERNS
 from fluxproof.diagnosis.catalogue.resistance import to_true_resistance
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, voltage
+from fluxproof.diagnosis.effects import Described, FreeCurve, Orders, Parameter, Relative, voltage
 from fluxproof.diagnosis.ground.result import Estimate
+from fluxproof.plant.transforms import PATTERNS
 
 
-class PhaseResistanceAsymmetry(Effect):
+class PhaseResistanceAsymmetry(FreeCurve, Relative, Described):
     def core(self, view):
         i_abc = view.phases(view.i_mid)
         r = view.machine.resistance_ohm
@@ -59,11 +59,10 @@ EFFECT = PhaseResistanceAsymmetry(
     title="unequal phase resistances",
     equation="u_x = R (1 + a_x) i_x, sum of a_x = 0",
     signature="order 2 in dq, proportional to current, independent of speed",
-    confounders=("current_gain", "resistance"),
     separated_by="standstill and speed: a sensor error also follows omega L i; the sum of three measured currents",
     parameters=tuple(Parameter(f"asymmetry_{x}", "1", f"phase {x}, relative to the mean", f"phase {x}") for x in "abc"),
-    shows_at=(2.0,),
     plausible={f"asymmetry_{x}": (-0.3, 0.3) for x in "abc"},
     otherwise="a loose contact or a broken strand in the cable",
     needs=("harmonics", "current"),
+    shows_at=Orders((2.0,)),
 )

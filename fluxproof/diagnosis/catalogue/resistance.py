@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Winding resistance that differs from the nameplate: u = R i."""
 
-from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, one, sigma, voltage
+from fluxproof.diagnosis.effects import DOUBT, Constant, FreeCurve, Parameter, Spread, one, sigma, voltage
 
 
 def to_true_resistance(c, nominal) -> float:
@@ -10,7 +10,9 @@ def to_true_resistance(c, nominal) -> float:
     return r / max(r + c.get("resistance", {}).get("delta_r", 0.0), 0.1 * r)
 
 
-class Resistance(Effect):
+class Resistance(FreeCurve, Constant, Spread):
+    rescales = ("resistance_ohm",)
+
     def core(self, view):
         return {"delta_r": voltage(view.i_mid)}
 
@@ -40,13 +42,8 @@ EFFECT = Resistance(
     title="winding resistance off the nameplate",
     equation="u_dq = (R + delta_r) i_dq",
     signature="order 0, proportional to current, at every speed including standstill",
-    confounders=("iron_loss", "magnet_flux", "dead_time", "resistance_temperature"),
-    rescales=("resistance_ohm",),
-    exact=True,
-    beside_map=True,
     separated_by="low speed and three loads; i_q reversed (against magnet_flux), several currents (against dead_time)",
     parameters=(Parameter("resistance_ohm", "ohm", "per phase, at the temperature of the recording", "resistance"),),
-    spreads=True,
     plausible={"resistance_ohm": (0.7, 2.0, "machine.resistance_ohm")},
     otherwise="a resistance between two terminals is twice that of a phase; cables and contacts add to the winding",
 )

@@ -5,7 +5,7 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.curves import COURSE_KNOTS, course, courses, known_temperature, reference_c
 from fluxproof.diagnosis.catalogue.resistance import to_true_resistance
-from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, one, sigma, voltage
+from fluxproof.diagnosis.effects import DOUBT, Drift, FreeCurve, Parameter, Relative, one, sigma, voltage
 
 COPPER = 0.0039  # 1/K
 BEHIND = 0.05  # of the recording: by how much a sensor usually is behind the winding
@@ -24,7 +24,9 @@ def _change(c, by_alpha):
     return float(np.max(np.abs(drift)))
 
 
-class ResistanceTemperature(Effect):
+class ResistanceTemperature(FreeCurve, Drift, Relative):
+    drift_of = "resistance"
+
     def expected(self, view):
         """A winding that warms has another resistance; where the drive has no coefficient, it is left out."""
         if not known_temperature(view) or view.machine.resistance_temp_coeff_per_k:
@@ -84,7 +86,6 @@ EFFECT = ResistanceTemperature(
     title="temperature drift of the winding resistance",
     equation="u_dq = R (1 + alpha (T - T_ref)) i_dq",
     signature="order 0, proportional to current times temperature rise",
-    confounders=("resistance", "magnet_temperature"),
     separated_by="a thermocouple; a load step while hot; standstill with current, cold and hot machine",
     parameters=(
         Parameter("resistance_temp_coeff_per_k", "1/K", "copper: 0.0039; needs temp_winding", "coefficient"),
@@ -95,5 +96,4 @@ EFFECT = ResistanceTemperature(
         "resistance_drift_ohm": (-0.2, 0.6, "machine.resistance_ohm"),
     },
     otherwise="copper has 0.39 %/K: something else warms up, or the sensor is not at the winding",
-    drift_of="resistance",
 )

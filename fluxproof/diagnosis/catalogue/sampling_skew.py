@@ -4,7 +4,16 @@
 import numpy as np
 
 from fluxproof.diagnosis.balance.late_pulses import instant, off_valley
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, angle_error, current_error, one, zero_vector_slope
+from fluxproof.diagnosis.effects import (
+    Alternatives,
+    FreeCurve,
+    MeasurementError,
+    Parameter,
+    angle_error,
+    current_error,
+    one,
+    zero_vector_slope,
+)
 
 TRIED, FINE = np.arange(-12, 13) / 50, 0.001  # periods after the valley
 NEAR = 0.1  # periods between a skew and that of its ripple
@@ -36,7 +45,10 @@ def _ripples(view):
     return {"pulses": off_valley(view, at) / (at * period or 1.0), "shift": step / (2.0 * STEP * period)}
 
 
-class SamplingSkew(Effect):
+class SamplingSkew(MeasurementError, FreeCurve, Alternatives):
+    corrected_last = True
+    one_of = (("tau",), ("angle",), ("pulses", "shift", "filter"))
+
     def core(self, view):
         # Either of the two is latched off the valley: if both are, the voltage is early.
         out = {"tau": skewed(view), "angle": angle_error(view, view.omega)}
@@ -101,14 +113,9 @@ EFFECT = SamplingSkew(
     title="shifted sampling instant of the currents",
     equation="i_measured = i(t + tau), di/dt = -(R i + j omega psi_m) / L",
     signature="order 0: omega^2 psi_m tau on the d axis, equivalent to an iron loss of R_fe = -L_q / tau",
-    confounders=("iron_loss", "delay", "inductance_q"),
-    one_of=(("tau",), ("angle",), ("pulses", "shift", "filter")),
     separated_by="load (an iron loss also follows omega^2 i_q); a deliberately shifted sampling trigger",
     parameters=(
         Parameter("skew_s", "s", "of the currents; positive: late", "after the angle by", "before the angle by"),
     ),
-    corrects=True,
-    stays="an error in time is in the recording itself",
-    corrected_last=True,
     needs=("harmonics", "inverter"),
 )

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Gain error of the measured bus voltage: it scales every voltage."""
 
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, one, sigma, voltage
+from fluxproof.diagnosis.effects import Constant, MeasurementError, Parameter, one, sigma, voltage
 
 LARGEST_GAIN, SMALLEST_GAIN = 2.5, -0.75  # the sensor of a drive that runs is right within a factor of 3.5
 
 
-class UdcGain(Effect):
+class UdcGain(MeasurementError, Constant):
+    rescales = ("u", "u_dc")
+
     def core(self, view):
         # The nominal drive's voltage replaces the applied one, whose noise is that of the misfit.
         return {"gain": voltage(view.machine.resistance_ohm * view.i_mid + view.flux(view.psi))}
@@ -37,13 +39,8 @@ EFFECT = UdcGain(
     title="gain error of the bus voltage sensor",
     equation="u_dc_measured = (1 + g) u_dc",
     signature="R, L_d, L_q and psi_m wrong by the same factor",
-    confounders=("magnet_flux", "current_scale", "resistance", "inductance_d", "inductance_q"),
-    rescales=("u", "u_dc"),
-    exact=True,
     separated_by="an external voltmeter, or the open-circuit EMF",
     parameters=(Parameter("udc_gain", "1", "relative error", "error"),),
-    corrects=True,
-    stays="an error of measurement is in the recording itself; the trims act from the next one on",
     plausible={"udc_gain": (-0.1, 0.1)},
     otherwise="the bus voltage of another point of the circuit, or the wrong divider",
     needs=("inverter",),

@@ -18,14 +18,15 @@ from typing import TypeVar
 import numpy as np
 
 from fluxproof.diagnosis.ground.arrays import Complex, Real
+from fluxproof.diagnosis.ground.machine import flux_linkage, mean_emf, steady_voltage
 from fluxproof.diagnosis.ground.nominal import Machine
+from fluxproof.plant.transforms import space_vector
 
 MOST_ROWS = 5000
 FIT = 0.25  # misfit over voltage: any real effect is smaller at speed
 BETTER = 0.3  # a change is accepted if the misfit falls below this share
 LEAST_ROWS, LEAST_OF_TABLE = 20, 6  # fewer fit by chance with some change
 LEAST_POINTS, SAME = 3, 0.1  # of dq values: operating points that are so far apart, of rated current and top speed
-TURNS: Complex = np.exp(2j * np.pi / 3 * np.arange(3))
 
 
 AnyRows = TypeVar("AnyRows", bound="_Intervals")
@@ -110,18 +111,16 @@ def misfit(rows: Rows, at_current: bool = False, at_d_current: bool = False) -> 
     m = rows.machine
     if isinstance(rows, SteadyRows):
         i, omega = rows.dq.mean(axis=0), rows.omega.mean(axis=0)
-        psi = m.inductance_d_h * i.real + 1j * m.inductance_q_h * i.imag + m.magnet_flux_wb
-        rest: Complex = rows.u_dq - m.resistance_ohm * i - 1j * omega * psi
+        rest: Complex = rows.u_dq - steady_voltage(m, i, omega)
         left, u, at = rest, rows.u_dq, i
         if np.isnan(u.real).any():
             left, u = rest.imag, u.imag
     else:
-        i_s: Complex = (2 / 3) * rows.i @ TURNS
+        i_s = space_vector(rows.i)
         turn = np.exp(1j * rows.theta)
         i, at = i_s * np.conj(turn), i_s[0]
-        psi = (m.inductance_d_h * i.real + 1j * m.inductance_q_h * i.imag + m.magnet_flux_wb) * turn
-        u = rows.u_dc * ((2 / 3) * rows.d @ TURNS)
-        left = u - m.resistance_ohm * i_s.mean(axis=0) - (psi[1] - psi[0]) / rows.period
+        u = rows.u_dc * space_vector(rows.d)
+        left = u - m.resistance_ohm * i_s.mean(axis=0) - mean_emf(flux_linkage(m, i), turn, rows.period)
     by = np.abs(at) if at_current else np.abs(i.real if at_d_current else u)
     large = by >= np.percentile(by, 75 if at_current or at_d_current else 50)
     size = float(np.median(np.abs(u[large])))
@@ -133,7 +132,7 @@ def discriminates(rows: Rows) -> bool:
     if isinstance(rows, SteadyRows):
         u = np.abs(np.where(np.isfinite(rows.u_dq), rows.u_dq, rows.u_dq.imag))
     else:
-        u = np.abs(rows.u_dc * ((2 / 3) * rows.d @ TURNS))
+        u = np.abs(rows.u_dc * space_vector(rows.d))
     drop = rows.machine.resistance_ohm * rows.machine.rated_current_a
     return float(np.percentile(u, 75)) > max(1.5 * drop, 1.0)
 

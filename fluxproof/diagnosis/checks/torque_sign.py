@@ -13,6 +13,7 @@ import numpy as np
 from fluxproof.diagnosis.balance.blocks import stator_current
 from fluxproof.diagnosis.balance.shaft import airgap
 from fluxproof.diagnosis.checks.balance import FIT, discriminates, misfit, rows_of
+from fluxproof.diagnosis.ground.machine import airgap_torque
 from fluxproof.diagnosis.ground.nominal import flux_level
 from fluxproof.diagnosis.ground.recording import Problem
 
@@ -29,7 +30,7 @@ def check(recording, nominal) -> None:
         return
     driving, torque = airgap(nominal, i), recording["torque"]
     good = recording.usable & np.isfinite(torque) & np.isfinite(driving)
-    rated = 1.5 * nominal.machine.pole_pairs * flux_level(nominal.machine) * nominal.machine.rated_current_a
+    rated = airgap_torque(nominal.machine, flux_level(nominal.machine), 1j * nominal.machine.rated_current_a)
     size = _rms(driving[good])
     if size < LOADED * rated or _rms((torque + driving)[good]) > ALIKE * size:
         return

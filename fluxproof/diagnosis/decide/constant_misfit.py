@@ -19,7 +19,7 @@ def explaining(view, cells, effects, drifting, constant) -> list[str]:
     """Effects that do not drift and explain the constant misfit alone, with a size that a drive can have."""
     out, limit = [], resolution(view)
     for name, effect in effects.items():
-        cores = {key: v for key, v in cells.columns[name].items() if not key.startswith("~")}
+        cores = {key: v for key, v in cells.columns[name].items() if (name, key) not in cells.free}
         if name in drifting or not cores:
             continue
         means = {key: complex(np.nanmean(at_order(cells, v, 0.0))) for key, v in cores.items()}

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fluxproof.diagnosis.effects.drive_file import relative
 from fluxproof.diagnosis.ground.plant_section import in_addition
 from fluxproof.diagnosis.ground.result import Estimate, NamedEffect
 from fluxproof.diagnosis.inference.fitted_set import covariance_of
@@ -38,7 +39,7 @@ def named_effects(names, posterior, explains, only=None) -> list[NamedEffect]:
         estimates = effect.estimates(c, covariance_of(best, name, best.cov), nominal)
         estimates = _with_absence(estimates, effect, (best.c[name], simpler), absent, nominal)
         estimates = _with_other_sets(estimates, name, names.fits, effect, nominal)
-        share = effect.relative({n: best.c[n] for n in best.names}, nominal)
+        share = relative(effect, {n: best.c[n] for n in best.names}, nominal)
         if share != 1.0:
             estimates = {key: _shared(e, share) for key, e in estimates.items()}
         plant = in_addition(effect.plant({key: share * v for key, v in c.items()}, nominal), nominal)

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from fluxproof.diagnosis.decide.decision import Decision
 from fluxproof.diagnosis.decide.verdict import kind_as_interpreted
+from fluxproof.diagnosis.effects.constant import rescaled
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.result import Evidence, Fit, Remainder
 
@@ -22,7 +23,7 @@ def is_exact(readings, left, effects) -> bool:
 
     Currents in rms that still need a gain error of a few per cent are a gain error by chance near that factor.
     """
-    return not any(set(effects[n].rescales) & r.touches for n in left for r in readings)
+    return not any(rescaled(effects[n]) & r.touches for n in left for r in readings)
 
 
 def is_simpler(readings, left, most, absurd) -> bool:

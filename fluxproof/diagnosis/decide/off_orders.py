@@ -15,8 +15,9 @@ import numpy as np
 from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.balance.quantised_angle import beat_ripple, beat_spectrum
-from fluxproof.diagnosis.effects.effect import rated_torque
+from fluxproof.diagnosis.effects import LegLoss, MeasurementError
 from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.machine import rated_torque
 
 MOST_ORDER = 80  # per mechanical turn; of a machine with many pole pairs those up to
 MOST_ELECTRICAL = 12  # per electrical turn
@@ -49,10 +50,10 @@ def row_residual(fit):
     left = misfit(view)["u"].copy()
     for name, c in fit.c.items():
         effect = effects[name]
-        if effect.corrects:
+        if isinstance(effect, MeasurementError):
             continue
-        seen = view if effect.smoothed else view.with_raw_current()
-        columns = {**effect.core(seen), **effect.free(seen)}
+        seen = view if isinstance(effect, LegLoss) else view.with_raw_current()
+        columns = effect.columns(seen)
         for key, value in c.items():
             if value and "u" in columns.get(key, {}):
                 left -= value * columns[key]["u"]
@@ -65,7 +66,7 @@ def stray_torque(view, projector, cells, residual, sigma) -> Stray | None:
     if use.sum() < 12:
         return None
     m, best = view.machine, None
-    rated = rated_torque(view.nominal)
+    rated = rated_torque(view.machine)
     for n in range(1, 5):
         angle = n * view.theta_mid / m.pole_pairs
         waves = [projector.rows({"torque": f(angle)})[use] / sigma[use] for f in (np.cos, np.sin)]

@@ -21,6 +21,7 @@ from fluxproof.diagnosis.decide.constant_misfit import explaining, resolution
 from fluxproof.diagnosis.decide.decision import CONSTANT, Basis, Decision, OnePoint, Withheld
 from fluxproof.diagnosis.decide.locate import evidence, locate
 from fluxproof.diagnosis.decide.verdict import kind_of_one_point
+from fluxproof.diagnosis.effects.course import moved
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.result import Estimate, Fit, NamedEffect, Remainder
 from fluxproof.diagnosis.inference.drift_fit import (
@@ -99,7 +100,7 @@ def _beside_constant(names, groups, unknown, fit: Fit):
 
 def _sorted_out(best, tied, effects, view):
     """(names, ambiguity sets): what all tied sets share is named."""
-    large = lambda s: {n for n in s.model.names if effects[n].moved(s.c[n], view) >= effects[n].floor(view.nominal)}  # noqa: E731
+    large = lambda s: {n for n in s.model.names if moved(effects[n], s.c[n], view) >= effects[n].floor(view.nominal)}  # noqa: E731
     sets = [large(s) for s in (best, *tied) if len(s.model) <= max(len(best.model), 1)]
     common, seen = set.intersection(*sets), set.union(*sets)
     rest = tuple(sorted(seen - common))

@@ -24,6 +24,7 @@ from fluxproof.diagnosis.decide.names import Names, names_of
 from fluxproof.diagnosis.decide.off_orders import Stray, row_residual, stray_order, stray_swing, stray_torque
 from fluxproof.diagnosis.decide.sizes import Sizes, left_by, measured_torque
 from fluxproof.diagnosis.decide.verdict import at_floor, is_usual, kind_of
+from fluxproof.diagnosis.effects import ShaftTorque
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.posterior import Posterior
 
@@ -91,7 +92,7 @@ def _off_orders(posterior, suspects, held) -> Stray | None:
     certain = np.flatnonzero(doubt <= k.FORMS_LEFT * before) if best.names else np.arange(len(setup.view))
     if not len(certain):
         return None
-    known = sorted({h for n in best.names for h in effects[n].trailing})
+    known = sorted({h for n in best.names for h in effects[n].shows_at.trailing})
     view, rows = best.problem.view.take(certain), row_residual(best)[certain]
     found = stray_order(view, rows, floor, known) or stray_swing(view, rows, floor)
     if found is None and measured_torque(setup):
@@ -113,7 +114,7 @@ def _as_noise(posterior, names, stray, held) -> Names:
     little = share is not None and share < k.HALF and setup.view.least_error < 1.0
     if not (at_floor(train) or (little and is_usual(train))):
         return names
-    shaft = {n for n, effect in setup.effects.items() if effect.mechanical}
+    shaft = {n for n, effect in setup.effects.items() if isinstance(effect, ShaftTorque)}
     hidden = setup.view.turns_freely.any() or not measured_torque(setup)
     return names.withheld(frozenset(shaft if hidden else ()))
 
@@ -137,5 +138,5 @@ def _sizes(best, explaining, blocks) -> Sizes:
 
 def _is_counted(explaining, setup) -> bool:
     """Whether a share is counted: of effects in the voltage, or of any where a transducer measures the torque."""
-    electrical = [n for n in explaining if not setup.effects[n].mechanical]
+    electrical = [n for n in explaining if not isinstance(setup.effects[n], ShaftTorque)]
     return bool(electrical or (explaining and measured_torque(setup)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import FluxEffect
+from fluxproof.diagnosis.effects.flux_effect import FluxEffect, LostFlux
 
 
 def in_turn(view, effects, totals, show):
@@ -25,5 +25,5 @@ def with_flux(view, effects, c, **changed):
     more = np.array([effects[n].delta_l(c[n]) for n in magnetic] or [(0.0, 0.0)]).sum(axis=0)
     least = -0.7 * np.array([view.machine.inductance_d_h, view.machine.inductance_q_h])
     view = view.replace(psi_extra=psi, delta_l=tuple(np.maximum(more, least)), **changed)
-    lost = [effects[n].lost_flux(view, c[n]) for n in sorted(c) if effects[n].takes_flux]
+    lost = [effects[n].lost_flux(view, c[n]) for n in sorted(c) if isinstance(effects[n], LostFlux)]
     return view.replace(psi_extra=psi + sum(lost)) if lost else view

@@ -16,6 +16,7 @@ import numpy as np
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.decide.credibility import credibilities
 from fluxproof.diagnosis.decide.sizes import UNITS, Sizes, measured_torque
+from fluxproof.diagnosis.effects import Spread
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.result import Remainder
 from fluxproof.diagnosis.inference.converge import around
@@ -23,7 +24,7 @@ from fluxproof.diagnosis.inference.fitted_set import FittedSet, covariance_of, l
 from fluxproof.diagnosis.inference.judged import CLOSE, Judged, Names
 from fluxproof.diagnosis.inference.search import until_it_stands
 
-BASE = tuple(name for name, effect in CATALOGUE.items() if effect.spreads)
+BASE = tuple(name for name, effect in CATALOGUE.items() if isinstance(effect, Spread))
 KEPT = 8  # sets of a recording that go into its row
 OWN = 6  # sets that are judged on their own linearisation in a round
 ROUNDS = 3
@@ -137,9 +138,8 @@ def estimates(fit) -> list[Estimated]:
     for name in fit.names:
         c = dict(fit.c[name])
         for key in c:
-            for column in ((name, key), (name, f"~{key}")):
-                if column in place:
-                    c[key] = float(values[place[column]])
+            if (name, key) in place:
+                c[key] = float(values[place[name, key]])
         found = effects[name].estimates(c, covariance_of(fit, name, covariance), nominal)
         out += [Estimated(name, key, float(e.value), float(e.sigma), e.unit) for key, e in found.items()]
     return out
@@ -152,7 +152,7 @@ def without_prior(fit) -> tuple[np.ndarray, np.ndarray]:
     columns leaves what the data say.  A direction of which they say nothing gets a sigma of 1000 prior sizes.
     """
     owner = np.array([fit.names.index(fit.problem.keys[n][0]) for n in fit.take], int)
-    core = np.array([not fit.problem.keys[n][1].startswith("~") for n in fit.take], bool)
+    core = np.array([fit.problem.keys[n] not in fit.problem.cells.free for n in fit.take], bool)
     sd = fit.sizes[owner] * fit.problem.prior[fit.take]
     precision = np.linalg.inv(fit.cov / np.outer(sd, sd))  # in units of the prior: well conditioned
     right = precision @ (fit.vector / sd)

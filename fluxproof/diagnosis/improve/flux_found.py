@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from fluxproof.diagnosis.decide.decision import Decision
-from fluxproof.diagnosis.effects.effect import LEAST_CURRENT, FluxEffect
+from fluxproof.diagnosis.effects import LEAST_CURRENT, BentFlux, FluxEffect
 from fluxproof.diagnosis.plan.candidates import steady_view
 from fluxproof.files import write_text
 from fluxproof.plant import FluxMap
@@ -56,7 +56,7 @@ def _model(decision: Decision):
     mine = sorted(asserted & magnetic & set(best.names))
     # Effects that replace each other leave one flux, if none of the group is something else.
     split = any(magnetic & set(group) and not magnetic >= set(group) for group in decision.ambiguity)
-    bent = not split and any(setup.effects[n].bends for n in mine)
+    bent = not split and any(isinstance(setup.effects[n], BentFlux) for n in mine)
     return setup.effects, best.c, setup.view, mine if bent else []
 
 

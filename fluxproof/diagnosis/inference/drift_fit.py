@@ -14,6 +14,7 @@ import numpy as np
 from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.balance.orders import at_order
 from fluxproof.diagnosis.catalogue.resistance_temperature import COPPER
+from fluxproof.diagnosis.effects import MeasurementError
 from fluxproof.diagnosis.ground import constants
 from fluxproof.diagnosis.ground.arrays import Complex
 from fluxproof.diagnosis.inference.least_squares import Fitter, Model
@@ -32,15 +33,17 @@ def centred_cells(cells):
         return table
 
     columns = {n: {k: centre(c) for k, c in own.items()} for n, own in cells.columns.items()}
-    return type(cells)(centre(cells.y), columns, cells.block, cells.order, cells.part, cells.channel, cells.ok)
+    return replace(cells, y=centre(cells.y), columns=columns)
 
 
 def drifts(cells, centred, name, effect) -> bool:
     """Whether the usual formula of an effect changes over time at a constant operating point."""
     rows = (cells.channel == "u") & (cells.order == 0)
-    cores = [k for k in cells.columns[name] if not k.startswith("~")]
+    cores = [k for k in cells.columns[name] if (name, k) not in cells.free]
     size = lambda c, k: float(np.linalg.norm(c.columns[name][k][rows]))  # noqa: E731
-    return not effect.corrects and any(size(centred, k) > constants.DRIFTS * max(size(cells, k), 1e-30) for k in cores)
+    return not isinstance(effect, MeasurementError) and any(
+        size(centred, k) > constants.DRIFTS * max(size(cells, k), 1e-30) for k in cores
+    )
 
 
 def row_sigmas(view, cells, raw: Complex):
@@ -110,6 +113,5 @@ def fitted(cells, solution):
     total = np.zeros(len(cells.y))
     for name, c in solution.c.items():
         for key, value in c.items():
-            column = cells.columns[name].get(key, cells.columns[name].get(f"~{key}"))
-            total = total + value * column
+            total = total + value * cells.columns[name][key]
     return at_order(cells, total, 0.0)

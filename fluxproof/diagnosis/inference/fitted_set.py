@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import believable
+from fluxproof.diagnosis.effects import believable
 from fluxproof.diagnosis.ground import constants as k
 
 
@@ -34,7 +34,7 @@ class FittedSet:
         c = {name: {} for name in self.names}
         for n, v in zip(self.take, self.vector, strict=True):
             name, key = self.problem.keys[n]
-            c[name][key.lstrip("~")] = float(v)
+            c[name][key] = float(v)
         for name in self.names:
             for key in self.problem.coefficients[name]:
                 c[name].setdefault(key, 0.0)

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from fluxproof.diagnosis.effects import MeasurementError
 from fluxproof.diagnosis.inference.converge import converged
 from fluxproof.diagnosis.inference.fitted_set import FittedSet, possible
 from fluxproof.diagnosis.inference.problem import Problem
@@ -52,7 +53,7 @@ class Judged:
 
     def errors(self, names: Names) -> frozenset[str]:
         """The measurement errors of a set, which are removed from the data: what is far from linear."""
-        return frozenset(n for n in names if self.setup.effects[n].corrects)
+        return frozenset(n for n in names if isinstance(self.setup.effects[n], MeasurementError))
 
     def judge(self, problem: Problem, sets: Iterable[Names], own=False):
         """Judge sets on a problem, but none that was judged on its own; own: it was linearised for these sets."""

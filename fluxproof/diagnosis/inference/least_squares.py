@@ -100,7 +100,7 @@ class Fitter:
         for k, (effect, key) in enumerate(zip(self.owner, self.names, strict=True)):
             core, free = self.index[effect]
             if np.isfinite(self.scale[k]):
-                (free if key.startswith("~") else core).append(k)
+                (free if (effect, key) in cells.free else core).append(k)
 
     def columns_of(self, model) -> np.ndarray:
         """Indices of a model's columns, the cores first."""
@@ -149,7 +149,7 @@ class Fitter:
             fitted += value * self.cells.columns[self.owner[k]][self.names[k]]
         for name in sorted(model.names):
             mine = [n for n, k in enumerate(index) if self.owner[k] == name]
-            out.c[name] = {self.names[index[n]].lstrip("~"): float(values[n]) for n in mine}
+            out.c[name] = {self.names[index[n]]: float(values[n]) for n in mine}
             out.covariance[name] = covariance[np.ix_(mine, mine)]
         out.residual = self.cells.y - fitted
         return out

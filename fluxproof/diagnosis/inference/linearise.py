@@ -17,8 +17,10 @@ from fluxproof.diagnosis.balance.curves import parabola
 from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.balance.shaft import MEASURED
 from fluxproof.diagnosis.balance.view import View
+from fluxproof.diagnosis.effects import LegLoss, MeasurementError
 from fluxproof.diagnosis.effects.corrections import in_turn, with_flux
-from fluxproof.diagnosis.effects.effect import rated_torque
+from fluxproof.diagnosis.effects.inverter import late_s
+from fluxproof.diagnosis.ground.machine import rated_torque
 from fluxproof.diagnosis.inference.least_squares import Fitter, everything
 
 
@@ -34,7 +36,7 @@ class Rows:
         self.view, self.effects = view, dict(effects)
         self.projector = Projector(view, loads=True)
         measured = bool(np.isin(view.shaft, MEASURED).all())
-        self.load = 0.0 if measured else rated_torque(view.nominal)
+        self.load = 0.0 if measured else rated_torque(view.machine)
         self.train = train_blocks[self.projector.block]
         self.cells = cells_of(view, self.effects.values(), self.projector)
         plain = noise(view, self.cells, self.cells.y)
@@ -85,11 +87,11 @@ def frozen(c) -> tuple:
 def linearised(rows: Rows, coefficients: tuple, names: tuple | None) -> Linearisation | None:
     """The columns of ``names`` (None: of all effects) around ``coefficients`` (see frozen); None: impossible ones."""
     effects, c = rows.effects, {name: dict(own) for name, own in coefficients}
-    totals = {n: dict(own) for n, own in c.items() if effects[n].corrects}
+    totals = {n: dict(own) for n, own in c.items() if isinstance(effects[n], MeasurementError)}
     view, plain = (in_turn(v, effects, totals, rows.view) for v in (rows.view, rows.smooth))
     if not (np.isfinite(view.u).all() and np.isfinite(view.i_raw).all()):
         return None
-    late = sum(effects[n].late_s(own, view.nominal) for n, own in c.items())
+    late = sum(late_s(effects[n], own, view.nominal) for n, own in c.items())
     view = with_flux(view, effects, c, late_s=late)
     cells = cells_of(view, [e for n, e in effects.items() if names is None or n in names], rows.projector)
     # The balance stays in recorded units: one that a gain scales down leaves less, and is not better for that.
@@ -99,13 +101,12 @@ def linearised(rows: Rows, coefficients: tuple, names: tuple | None) -> Linearis
     cells = scaled(cells, scale)
     change = scale * rows.projector.rows(misfit(plain)) - rows.smooth_rows if totals else np.zeros(len(cells.y))
     ripple = cells.y - rows.cells.y - change
-    kept = [n for n in c if not effects[n].corrects and not effects[n].smoothed and n in cells.electrical]
+    kept = [n for n in c if not isinstance(effects[n], (MeasurementError, LegLoss)) and n in cells.electrical]
     if kept:
-        rough, _ = columns_of(view.with_raw_current(), [effects[n] for n in kept], rows.projector)
+        rough, *_ = columns_of(view.with_raw_current(), [effects[n] for n in kept], rows.projector)
     for name in kept:
         even, raw = cells.columns[name], rough[name]
         for key, value in c[name].items():
-            key = key if key in even else f"~{key}"
             if value and key in even and key in raw:
                 ripple -= value * (scale * raw[key] - even[key])
     doubts = [effects[n].doubt(own, view) for n, own in c.items()]

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import rated_torque
 from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.machine import rated_torque
 from fluxproof.diagnosis.inference.model import BalanceRows
 
 
@@ -61,7 +61,7 @@ def balance_level(view, cells):
     m = view.machine
     ripple = np.where(cells.order == 0, 1.0, k.BALANCE_ORDER)
     level = ripple * view.balance_error()[cells.block]
-    level = np.where(cells.channel == "torque", ripple * k.BALANCE_TORQUE * rated_torque(view.nominal), level)
+    level = np.where(cells.channel == "torque", ripple * k.BALANCE_TORQUE * rated_torque(view.machine), level)
     return np.where(cells.channel == "sum", k.BALANCE_SUM * m.rated_current_a, level)
 
 

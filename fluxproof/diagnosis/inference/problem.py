@@ -13,6 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from fluxproof.diagnosis.effects import Alternatives
+from fluxproof.diagnosis.effects.constant import is_exact
+from fluxproof.diagnosis.effects.free_curve import alternatives
+from fluxproof.diagnosis.effects.search import log_choice
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
 from fluxproof.diagnosis.inference.fitted_set import FittedSet, implausible, log_too_small
@@ -37,12 +41,12 @@ class Problem:
         for name, c in self.totals.items():
             columns = cells.columns[name]
             for key, value in c.items():
-                column = columns.get(key, columns.get(f"~{key}"))
+                column = columns.get(key)
                 if value and column is not None:
                     y = y + value * column
         self.y = y
         self.keys = [(name, key) for name, columns in cells.columns.items() for key in columns]
-        self.coefficients = {name: [key.lstrip("~") for key in columns] for name, columns in cells.columns.items()}
+        self.coefficients = {name: list(columns) for name, columns in cells.columns.items()}
         stack = [cells.columns[n][key] for n, key in self.keys]
         x = np.array(stack).T if stack else np.zeros((len(y), 0))
         if doubt is not None:
@@ -60,16 +64,16 @@ class Problem:
         for name in self.cells.columns:
             effect = self.setup.effects[name]
             mine = [n for n, (owner, _) in enumerate(self.keys) if owner == name]
-            cores = [n for n in mine if not self.keys[n][1].startswith("~") and length[n] > 1e-9]
+            cores = [n for n in mine if self.keys[n] not in self.cells.free and length[n] > 1e-9]
             floor = effect.floor(nominal)
-            zero = {self.keys[n][1].lstrip("~"): 0.0 for n in mine}
+            zero = {self.keys[n][1]: 0.0 for n in mine}
             for n in cores:
                 unit = effect.size({**zero, self.keys[n][1]: 1.0}, nominal)
                 self.prior[n] = floor / max(unit, 1e-30)
-            curves = [n for n in mine if self.keys[n][1].startswith("~") and length[n] > 1e-9]
+            curves = [n for n in mine if self.keys[n] in self.cells.free and length[n] > 1e-9]
             scales = {self.keys[n][1]: self.prior[n] for n in cores}
             for n in curves if cores else []:
-                self.prior[n] = effect.curve * effect.curve_scale(self.keys[n][1][1:], scales, nominal)
+                self.prior[n] = effect.curve * effect.curve_scale(self.keys[n][1], scales, nominal)
             ceiling = effect.ceiling(nominal)
             self.most[name] = max(min(ceiling / floor, k.WIDEST), 2.0) if np.isfinite(ceiling) else k.UNBOUNDED
             self.index[name] = cores + [n for n in curves if self.prior[n] > 0.0] if cores else []
@@ -96,14 +100,14 @@ class Problem:
         c = {}
         for n, value in zip(found[0], found[2], strict=True):
             name, key = self.keys[n]
-            c.setdefault(name, {})[key.lstrip("~")] = float(value)
-        chosen = {name: self.setup.effects[name] for name in c if self.setup.effects[name].one_of}
+            c.setdefault(name, {})[key] = float(value)
+        chosen = {name: self.setup.effects[name] for name in c if isinstance(self.setup.effects[name], Alternatives)}
         return any(effect.too_large(c[name], self.setup.view) for name, effect in chosen.items())
 
     def _ways(self, name) -> list[list[int]]:
         """The columns of an effect, once with each group of those that exclude each other."""
-        one_of = self.setup.effects[name].one_of
-        group = {n: [g for g in one_of if self.keys[n][1].lstrip("~") in g] for n in self.index[name]}
+        one_of = alternatives(self.setup.effects[name])
+        group = {n: [g for g in one_of if self.keys[n][1] in g] for n in self.index[name]}
         seen = [g for g in one_of if [g] in group.values()]
         return [[n for n, mine in group.items() if not mine or mine == [kept]] for kept in seen or (None,)]
 
@@ -116,9 +120,9 @@ class Problem:
         scale = np.append(self.prior[take], np.ones(common))
         x = np.column_stack([p.x[:, take], self.common])
         # Where no formula is preferred (a curve of 1), the free columns tell the size too.
-        tells = lambda name, key: not key.startswith("~") or self.setup.effects[name].curve >= 1.0  # noqa: E731
-        core = np.array([tells(*self.keys[n]) for n in mine] + [True] * common, bool)
-        formula = np.array([0.0 if self.setup.effects[n].exact else k.FORMULA for n in names] + [0.0])
+        tells = lambda key: key not in self.cells.free or self.setup.effects[key[0]].curve >= 1.0  # noqa: E731
+        core = np.array([tells(self.keys[n]) for n in mine] + [True] * common, bool)
+        formula = np.array([0.0 if is_exact(self.setup.effects[n]) else k.FORMULA for n in names] + [0.0])
         drags = p.loads >= 0 and bool(x[p.group == p.loads].any())
         columns, starts = Columns(x, scale, owner, core, most, formula), (np.inf, 1.5, 3.0) if drags else (np.inf,)
         tried = [evidence(p.rows(), columns, self.setup.prior(p), start) for start in starts]
@@ -134,7 +138,7 @@ class Problem:
         # geometric mean of the smallest of interest and the largest possible one, and falling beyond.
         value += sum(
             self.setup.odds(n)
-            + self.setup.effects[n].log_choice(self.setup.view)
+            + log_choice(self.setup.effects[n], self.setup.view)
             - np.log(np.log(self.most[n]))
             - np.log1p(x**2 / self.most[n])
             for n, x in zip(names, a, strict=True)

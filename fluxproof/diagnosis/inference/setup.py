@@ -10,6 +10,7 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.cells import repeats, voltage_level
 from fluxproof.diagnosis.balance.operating_points import point_numbers
+from fluxproof.diagnosis.effects import Drift
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.linearise import Rows, at_once
 from fluxproof.diagnosis.inference.model import Prior
@@ -45,7 +46,9 @@ class Setup:
         self.grouping = Grouping(self.cells, self.points, self.visits, self.cells.ok & self.train, self.view.run)
         self.repeats = _repeats(self.cells, self.points)
         self.shifts = {}
-        self.expected = {name for name, effect in self.effects.items() if effect.expected(self.view)}
+        self.expected = {
+            name for name, effect in self.effects.items() if isinstance(effect, Drift) and effect.expected(self.view)
+        }
 
     @property
     def floor(self):

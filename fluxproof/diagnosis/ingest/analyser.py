@@ -18,6 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.ground.arrays import Complex
+from fluxproof.diagnosis.ground.machine import flux_terms
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.ingest.demand import is_analysed
 
@@ -57,8 +58,8 @@ def _voltage(u, phi, i: Complex, omega, told, machine) -> Complex:
     Where the two are close, the machine that fits best to all points decides, which starts as the nominal one.
     """
     ahead, behind = (u * np.exp(1j * (np.angle(i) + sign * phi)) for sign in (1.0, -1.0))
-    usual = np.array([machine.resistance_ohm, machine.inductance_d_h, machine.inductance_q_h, machine.magnet_flux_wb])
-    terms: Complex = usual * np.stack([i, 1j * omega * i.real, -omega * i.imag, 1j * omega * np.ones(len(i))], axis=1)
+    emf = [1j * omega * psi for psi in flux_terms(machine, i)]
+    terms: Complex = np.stack([machine.resistance_ohm * i, *emf], axis=1)
     share = np.ones(4)
     found: Complex | None = None
     for _ in range(STEPS):

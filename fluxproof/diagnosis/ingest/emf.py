@@ -17,13 +17,13 @@ from scipy.interpolate import CubicSpline
 
 from fluxproof.diagnosis.ground.recording import Problem, Recording, RecordingError
 from fluxproof.diagnosis.ingest.demand import LINE_VOLTAGES, PHASE_VOLTAGES
+from fluxproof.plant.transforms import AXES, phase_values, space_vector
 
 LEAST_PER_TURN = 10.0  # samples of an electrical turn
 GAP = 1.5  # times the usual step of the time
 LEAST_ROWS = 20  # of a stretch
 LEAST_VOLTAGE = 0.05  # of the largest one: at a lower speed the fundamental's phase is noise
 NO_CURRENT = 0.02  # of rated current
-TURNS = np.exp(2j * np.pi / 3 * np.arange(3))
 SLOW = ("temp_winding", "torque")  # further columns that are used
 LACKS = frozenset({"inverter", "current"})
 
@@ -91,11 +91,11 @@ def _without_current(path, columns, nominal) -> None:
 def _space_vector(columns) -> np.ndarray:
     """Complex voltage (n,) [V], amplitude-invariant; a common point of the three voltages cancels."""
     if all(name in columns for name in PHASE_VOLTAGES):
-        return (2 / 3) * (np.stack([columns[name] for name in PHASE_VOLTAGES], axis=1) @ TURNS)
+        return space_vector(np.stack([columns[name] for name in PHASE_VOLTAGES], axis=1))
     ab, bc, ca = (columns.get(name) for name in LINE_VOLTAGES)
     ab = -bc - ca if ab is None else ab
     bc = -ab - ca if bc is None else bc
-    return (2 / 3) * (ab - bc * TURNS[2])  # u_a + a u_b + a^2 u_c with u_b = u_a - ab, u_c = u_b - bc
+    return (2 / 3) * (ab - bc * AXES[2])  # u_a + a u_b + a^2 u_c with u_b = u_a - ab, u_c = u_b - bc
 
 
 def _speed_of(v, t) -> float:
@@ -149,7 +149,7 @@ def _resampled(t, v, period):
 
 def _rows(at, u, columns, t, nominal) -> dict:
     """Canonical arrays of a part; theta_e is nan at the ends if it is that of the fundamental."""
-    legs = (u[:, None] * np.conj(TURNS)).real
+    legs = phase_values(u)
     out = {"t": at, "i_d": np.zeros(len(at)), "i_q": np.zeros(len(at))}
     out |= {name: legs[:, k] for k, name in enumerate(PHASE_VOLTAGES)}
     if "theta_e" in columns:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.machine import steady_voltage
 from fluxproof.diagnosis.ground.recording import Problem, Recording
 
 LEAST_ROWS = 400  # a fast log needs more rows (checks/enough.py)
@@ -64,9 +65,9 @@ def _together(recording, nominal) -> bool:
     """Whether the voltage changes in the rows in which current and speed do, by about what the nominal drive needs."""
     if not recording.has("i_d", "i_q", "u_q_ref", "omega_e"):
         return False
-    m, r = nominal.machine, recording
+    r = recording
     i, u = r["i_d"] + 1j * r["i_q"], r["u_q_ref"]
-    needed = (m.resistance_ohm * i).imag + r["omega_e"] * (m.inductance_d_h * i.real + m.magnet_flux_wb)
+    needed = steady_voltage(nominal.machine, i, r["omega_e"]).imag
     steps, seen = np.diff(needed), np.diff(u)
     large = (np.abs(steps) > LARGE * np.abs(u).max()) | (np.abs(seen) > LARGE * np.abs(u).max())
     return not large.any() or bool(np.mean(np.abs(seen - steps)[large] < 0.5 * np.abs(steps)[large]) > MOSTLY)

@@ -21,8 +21,9 @@ from fluxproof.diagnosis.balance.misfit import bulge
 from fluxproof.diagnosis.conventions.reading import Reading
 from fluxproof.diagnosis.conventions.table import pole_pairs_for, readings_for
 from fluxproof.diagnosis.decide.interpretation import is_exact, is_simpler
-from fluxproof.diagnosis.effects.effect import torque_of
+from fluxproof.diagnosis.effects import torque_of
 from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.machine import flux_terms
 from fluxproof.diagnosis.inference.evidence import evidence
 from fluxproof.diagnosis.inference.fitted_set import implausible
 from fluxproof.diagnosis.inference.linearise import Rows
@@ -154,8 +155,7 @@ def _terms(rows, turn) -> dict[str, np.ndarray]:
     view = rows.view.turned(-turn) if turn else rows.view
     exact, m = view.with_raw_current(), view.machine
     i = exact.i
-    d, q = m.inductance_d_h * i.real + 0j, 1j * m.inductance_q_h * i.imag
-    psi = m.magnet_flux_wb + 0.0 * i
+    d, q, psi = flux_terms(m, i)
     columns = {
         "u": {"u": view.to_dq(view.u[:, 1:-1])},
         "r": {"u": -m.resistance_ohm * (exact.i_mid - bulge(view))},

@@ -3,7 +3,7 @@
 
 The controller hides an effect from the currents, in the drive and in the simulation; the signal to compare is the
 commanded voltage.  Speed, bus voltage and references are those of the recording; controller and plant are simulated
-(overlay_loop.py) for at most 20,000 rows in stretches over the recording.
+(loop.py) for at most 20,000 rows in stretches over the recording.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from fluxproof.diagnosis.ground.nominal import Nominal, load_nominal
 from fluxproof.diagnosis.ground.plant_section import Plant, errors_beyond, plant_of
 from fluxproof.diagnosis.ground.recording import Recording, RecordingError
 from fluxproof.diagnosis.overlay.inputs import SETTLING_ROWS, Stretch, dq, dq_currents, stretches
-from fluxproof.diagnosis.overlay.loop import Controller, Errors, run_loop
+from fluxproof.diagnosis.overlay.loop import Controller, Errors, Inputs, run_loop
 from fluxproof.plant import IMPOSED_SPEED, initial_state, plant_params
 from golden_model.scaling import current_gains
 
@@ -105,14 +105,15 @@ def controller_of(nominal: Nominal) -> Controller:
         c = dataclasses.replace(c, current_bandwidth_hz=USUAL_BANDWIDTH / nominal.sample_time_s)
     (kp_d, ki_d), (kp_q, ki_q) = (current_gains(dataclasses.replace(nominal, control=c), x) for x in "dq")
     return Controller(
-        kp_d,
-        kp_q,
-        ki_d,
-        ki_q,
-        m.inductance_d_h,
-        m.inductance_q_h,
-        m.magnet_flux_wb,
-        float(c.delay_samples) - nominal.sampling.delay_s / nominal.sample_time_s,
+        kp_d=kp_d,
+        kp_q=kp_q,
+        ki_d=ki_d,
+        ki_q=ki_q,
+        inductance_d=m.inductance_d_h,
+        inductance_q=m.inductance_q_h,
+        magnet_flux=m.magnet_flux_wb,
+        delay_samples=float(c.delay_samples) - nominal.sampling.delay_s / nominal.sample_time_s,
+        period_s=nominal.sample_time_s,
     )
 
 
@@ -120,10 +121,14 @@ def _errors(plant: Plant, nominal: Nominal) -> tuple[Errors, float]:
     """(Errors of the hardware relative to the nominal drive, angle offset [rad])."""
     beyond, timing = errors_beyond(plant.sensors, nominal), plant.timing
     delay = nominal.control.duty_applied_after_samples + timing.delay_s / nominal.sample_time_s
-    return Errors(
-        np.asarray(beyond["current_gain"], float), np.asarray(beyond["current_offset_a"], float),
-        float(beyond["u_dc_gain"]), float(timing.sampling_skew_s), max(0.0, float(delay)),
-    ), beyond["theta_offset"]  # fmt: skip
+    errors = Errors(
+        current_gain=np.asarray(beyond["current_gain"], float),
+        current_offset=np.asarray(beyond["current_offset_a"], float),
+        u_dc_gain=float(beyond["u_dc_gain"]),
+        skew_s=float(timing.sampling_skew_s),
+        delay_periods=max(0.0, float(delay)),
+    )
+    return errors, beyond["theta_offset"]
 
 
 def _true_angle(theta, plant: Plant, offset):
@@ -157,8 +162,6 @@ def _simulate(part: Stretch, plant: Plant, nominal: Nominal, recorded) -> np.nda
     integral = np.array([u_d + omega * c.inductance_q * i_q, u_q - omega * (c.inductance_d * i_d + c.magnet_flux)])
     hot = np.where(np.isfinite(part.temperature), part.temperature, machine.temperature_winding_c)
     out = np.zeros((len(part.rows), 4))
-    run_loop(
-        state, params, controller, errors, part.theta, theta, part.omega, np.ascontiguousarray(part.i_ref, float),
-        np.ascontiguousarray(part.u_dc, float), hot, integral, nominal.sample_time_s, out,
-    )  # fmt: skip
+    i_ref, u_dc = (np.ascontiguousarray(values, float) for values in (part.i_ref, part.u_dc))
+    run_loop(state, params, controller, errors, Inputs(part.theta, theta, part.omega, i_ref, u_dc, hot), integral, out)
     return out[:, [2, 3, 0, 1]]

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ from scipy.signal import savgol_filter
 
 from fluxproof.diagnosis.ground.nominal import Nominal
 from fluxproof.diagnosis.ground.recording import Recording, RecordingError
+from fluxproof.plant.transforms import space_vector
 
 MOST_ROWS = 20_000  # simulated rows
 WINDOW_ROWS = 2_000
@@ -41,7 +41,7 @@ def dq_currents(recording: Recording) -> np.ndarray:
 
 def dq(a, b, c, theta) -> np.ndarray:
     """(n, 2) dq values of three phase values, amplitude-invariant Clarke, d axis at theta."""
-    x = ((2.0 * a - b - c) + 1j * math.sqrt(3.0) * (b - c)) / 3.0 * np.exp(-1j * theta)
+    x = space_vector(np.stack([a, b, c], axis=1)) * np.exp(-1j * theta)
     return np.stack([x.real, x.imag], axis=1)
 
 

@@ -6,6 +6,9 @@
     duties by centred zero vectors for the angle theta + delay_samples w T, in force a whole number of periods later
 
 The controller's measurements contain the sensor errors; the plant rotates as in the recording.
+
+It is a controller of its own, since the recorded drive may have any: the golden core needs the registers of a core, its
+reference models are one call of Python a block and sample, and `fluxproof simulate` drives a switching plant.
 """
 
 from __future__ import annotations
@@ -22,16 +25,17 @@ from fluxproof.plant.transforms import clarke, inverse_clarke
 
 
 class Controller(NamedTuple):
-    """Gains and parameters of the controller, SI units."""
+    """Gains and parameters of the controller."""
 
-    kp_d: float
+    kp_d: float  # V/A
     kp_q: float
-    ki_d: float
+    ki_d: float  # V/(A s)
     ki_q: float
-    inductance_d: float
+    inductance_d: float  # H
     inductance_q: float
-    magnet_flux: float
+    magnet_flux: float  # Wb
     delay_samples: float  # by which the angle of the output is advanced
+    period_s: float
 
 
 class Errors(NamedTuple):
@@ -44,14 +48,25 @@ class Errors(NamedTuple):
     delay_periods: float  # from a sample to the period in which its duties act
 
 
+class Inputs(NamedTuple):
+    """What n rows impose."""
+
+    theta_read: np.ndarray  # (n + 1,) angle that the sensor reads, electrical, unwrapped [rad]
+    theta_true: np.ndarray  # (n + 1,) [rad]
+    omega: np.ndarray  # (n,) electrical [rad/s]
+    i_ref: np.ndarray  # (n, 2) dq [A]
+    u_dc: np.ndarray  # (n,) measured [V]
+    temperature: np.ndarray  # (n,) of the winding [deg C]
+
+
 @njit
-def run_loop(state, params, c, e, theta_read, theta_true, omega, i_ref, u_dc, temperature, integral, period_s, out):
+def run_loop(state, params, c, e, rows, integral, out):
     """Simulate n rows; ``out`` (n, 4) receives measured i_d, i_q [A] and commanded u_d, u_q [V].
 
-    theta_read, theta_true (n + 1,): electrical angle, unwrapped [rad]; omega (n,) [rad/s]; i_ref (n, 2) [A];
-    u_dc (n,) measured [V]; temperature (n,) of the winding [deg C]; integral (2,) [V] of the regulators at the start.
+    c: Controller; e: Errors; rows: Inputs; integral: (2,) [V] of the regulators at the start.
     """
-    poles = params.machine.pole_pairs
+    theta_read, theta_true, omega, i_ref, u_dc, temperature = rows
+    period_s, poles = c.period_s, params.machine.pole_pairs
     whole = int(math.floor(e.delay_periods))
     part = e.delay_periods - whole
     queue = np.full((whole + 2, 3), 0.5)  # row j: duties of j samples ago

@@ -7,8 +7,10 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.cells import voltage_level
 from fluxproof.diagnosis.balance.view import View
-from fluxproof.diagnosis.effects.effect import LEAST_CURRENT
+from fluxproof.diagnosis.effects import LEAST_CURRENT
+from fluxproof.diagnosis.ground.machine import steady_voltage
 from fluxproof.diagnosis.ground.nominal import flux_level
+from fluxproof.plant.transforms import linear_limit
 
 ROWS = 200
 
@@ -24,8 +26,7 @@ def steady_view(view: View, omega, i_dq, cold: bool | np.ndarray = False, rows=R
     theta = 0.1 + omega[:, None] * period * np.arange(-1, rows + 2)
     steady = lambda x, n: np.repeat(np.asarray(x)[:, None], n, axis=1)  # noqa: E731
     i = steady(i_dq, rows + 1)
-    psi = view.inductances(i_dq) + view.machine.magnet_flux_wb
-    u_dq = view.machine.resistance_ohm * i_dq + 1j * omega * psi
+    u_dq = steady_voltage(view.machine, i_dq, omega, view.inductances(i_dq) + view.machine.magnet_flux_wb)
     middle = 0.5 * (theta[:, 1:] + theta[:, :-1])
     inner = theta[:, 1:-1]
     return view.replace(
@@ -73,7 +74,7 @@ def grid(view):
 
 def limits(view) -> tuple[float, float]:
     """(largest voltage [V], speed to which SPEEDS refer [rad/s])."""
-    linear = view.nominal.inverter.dc_bus_v / np.sqrt(3)
+    linear = linear_limit(view.nominal.inverter.dc_bus_v)
     u_max = np.clip(float(voltage_level(view).max()), 0.74 * linear, 0.9 * linear)
     return u_max, max(view.top_speed, REACHED * u_max / flux_level(view.machine))
 
@@ -84,7 +85,7 @@ def within_limits(view):
     top, rated = 1.000001 * max(SPEEDS) * top, 1.000001 * m.rated_current_a
 
     def within(omega, i):
-        u = m.resistance_ohm * i + 1j * omega * (view.inductances(i) + m.magnet_flux_wb)
+        u = steady_voltage(m, i, omega, view.inductances(i) + m.magnet_flux_wb)
         still = (omega == 0.0) & (i == 0.0)  # standstill without current gives no information
         return (np.abs(u) <= u_max) & (np.abs(omega) <= top) & (np.abs(i) <= rated) & ~np.asarray(still)
 

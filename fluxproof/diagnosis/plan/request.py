@@ -11,6 +11,7 @@ import numpy as np
 from fluxproof.diagnosis.balance.cells import Projector, voltage_level
 from fluxproof.diagnosis.balance.joined import stayed_cold
 from fluxproof.diagnosis.balance.view import View
+from fluxproof.diagnosis.effects import Drift
 from fluxproof.diagnosis.ground import constants
 from fluxproof.diagnosis.plan.bench_point import on_the_bench
 from fluxproof.diagnosis.plan.candidates import grid, new_axes, steady_view, within_limits
@@ -26,8 +27,7 @@ NEW_AXIS, STRAIN = 0.2, 0.2
 
 def columns_at(p, view, effect) -> dict:
     """Rows {coefficient: (r,)} of an effect's core and free columns at the blocks of a view."""
-    core, free = effect.core(view), effect.free(view)
-    return {key: p.rows(column) for key, column in {**core, **free}.items()}
+    return {key: p.rows(column) for key, column in effect.columns(view).items()}
 
 
 def known_of(fit, columns) -> np.ndarray:
@@ -38,7 +38,7 @@ def known_of(fit, columns) -> np.ndarray:
     """
     problem = fit.problem
     p = problem.p
-    place = {(n, key.lstrip("~")): j for j, (n, key) in enumerate(problem.keys)}
+    place = {(n, key): j for j, (n, key) in enumerate(problem.keys)}
     weight = 1.0 / np.sqrt(fit.variance)
     x = p.x * weight[:, None]
     length = np.linalg.norm(x, axis=0)
@@ -68,8 +68,8 @@ def determined(fit) -> dict:
     for n, c in out.items():
         mine = {key: length[j] for j, (name, key) in enumerate(problem.keys) if name == n}
         least = constants.SHOWN * max(mine.values(), default=0.0)
-        for key in [k for k, size in mine.items() if k.startswith("~") and size <= least]:
-            c.pop(key.lstrip("~"), None)
+        for key in [k for k, size in mine.items() if (n, k) in problem.cells.free and size <= least]:
+            c.pop(key, None)
     return out
 
 
@@ -79,7 +79,7 @@ def wants_cold(names, effects, view) -> bool:
     Two drifts would both vanish; they are separated by the load on the warm machine.  If the winding stayed cold while
     something drifted, its temperature cannot show that the drift has vanished.
     """
-    drifting = [effects[n].drift_of != "" for n in names]
+    drifting = [isinstance(effects[n], Drift) for n in names]
     return any(drifting) and not all(drifting) and not stayed_cold(view)
 
 

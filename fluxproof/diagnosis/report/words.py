@@ -8,6 +8,7 @@ import math
 from types import SimpleNamespace
 
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.effects import ShaftTorque
 from fluxproof.diagnosis.ground.quantities import measured, number, quantity, unit_text
 from fluxproof.diagnosis.suspects import SUSPECTS
 
@@ -61,7 +62,7 @@ def explained(effect, effects) -> str:
     if not math.isfinite(effect.explains) or effect.explains > LEAST_SHARE:
         return percent(effect.explains)
     entry = CATALOGUE.get(effect.name)
-    if entry is not None and entry.mechanical:
+    if isinstance(entry, ShaftTorque):
         return "in the torque"
     if sum(e.explains for e in effects) > SMALL:
         return "< 1 %"

@@ -1,35 +1,40 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Current sensors that are no longer linear towards full scale, as behind a core or an amplifier that saturates."""
 
+from typing import NamedTuple
+
 import numpy as np
 
-from fluxproof.diagnosis.catalogue.current_gain import PATTERNS
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, phase_error
+from fluxproof.diagnosis.effects import FreeCurve, MeasurementError, Orders, Parameter, phase_error
 from fluxproof.diagnosis.ground.result import Estimate
+from fluxproof.plant.transforms import PATTERNS
 
 PHASES = {**PATTERNS, "common": (1.0, 1.0, 1.0)}
 
 
-def _errors(view):
-    """{key: (b, m+1, 3)} errors of the phase currents [A] per unit of the coefficients."""
+class Bend(NamedTuple):
+    """Key of a coefficient: a power of the phase currents, with the weights of a pattern."""
+
+    power: int
+    pattern: str
+
+
+def _errors(view, powers=(3, 5)):
+    """{Bend: (b, m+1, 3)} errors of the phase currents [A] per unit of the coefficients."""
     x = view.phases(view.i) / view.machine.rated_current_a
-    shapes = {"cubic": x**3, "quintic": x**5}
     return {
-        f"{shape}_{name}": view.machine.rated_current_a * values * np.array(weights)
-        for shape, values in shapes.items()
+        Bend(power, name): view.machine.rated_current_a * x**power * np.array(weights)
+        for power in powers
         for name, weights in PHASES.items()
     }
 
 
-class CurrentBend(Effect):
-    def _columns(self, view, shape):
-        return {key: phase_error(view, error) for key, error in _errors(view).items() if key.startswith(shape)}
-
+class CurrentBend(MeasurementError, FreeCurve):
     def core(self, view):
-        return self._columns(view, "cubic")
+        return {key: phase_error(view, error) for key, error in _errors(view, (3,)).items()}
 
     def free(self, view):
-        return self._columns(view, "quintic")
+        return {key: phase_error(view, error) for key, error in _errors(view, (5,)).items()}
 
     def floor(self, nominal):
         return 0.005
@@ -40,7 +45,7 @@ class CurrentBend(Effect):
     @staticmethod
     def _phases(c) -> np.ndarray:
         """(3,) relative error of each phase at rated current."""
-        return sum((value * np.array(PHASES[key.partition("_")[2]]) for key, value in c.items()), np.zeros(3))
+        return sum((value * np.array(PHASES[key.pattern]) for key, value in c.items()), np.zeros(3))
 
     def size(self, c, nominal):
         return float(np.max(np.abs(self._phases(c))))
@@ -51,7 +56,7 @@ class CurrentBend(Effect):
     def estimates(self, c, covariance, nominal):
         phases = self._phases(c)
         worst = int(np.argmax(np.abs(phases)))
-        weights = np.array([PHASES[key.partition("_")[2]][worst] for key in c])
+        weights = np.array([PHASES[key.pattern][worst] for key in c])
         spread = float(np.sqrt(max(weights @ covariance @ weights, 0.0)))
         return {"bend": Estimate(float(phases[worst]), spread, "1")}
 
@@ -62,11 +67,8 @@ EFFECT = CurrentBend(
     clause="the current sensors were nonlinear towards full scale, as with a saturating core",
     equation="i_measured = i + b i^3, b of each phase",
     signature="a sum of the phase currents that follows their third power; order 0 as for a saturation, and order 6",
-    confounders=("saturation", "current_scale", "current_gain"),
     separated_by="a second current sensor at full scale; the sum of three measured currents",
     parameters=(Parameter("bend", "1", "relative error at rated current of the worst phase", "bend"),),
-    corrects=True,
-    named=False,
-    shows_at=(0.0, 2.0, 6.0),
     needs=("harmonics", "current"),
+    shows_at=Orders((0.0, 2.0, 6.0)),
 )

@@ -4,10 +4,10 @@
 import numpy as np
 
 from fluxproof.diagnosis.balance.curves import course, courses
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, sigma
+from fluxproof.diagnosis.effects import FreeCurve, MeasurementError, Parameter, current_error, one, sigma
 
 
-class CurrentGainDrift(Effect):
+class CurrentGainDrift(MeasurementError, FreeCurve):
     def core(self, view):
         return {"drift": current_error(view, view.i * course(view))}
 
@@ -45,10 +45,7 @@ EFFECT = CurrentGainDrift(
     clause="the gain of all current sensors drifted over the recording, as with a shunt that warms up",
     equation="i_measured = (1 + s t) i, with t from 0 to 1 over the recording",
     signature="R, L_d and L_q drift by the same factor",
-    confounders=("resistance_temperature", "current_scale"),
     separated_by="the same operating point at the start and at the end",
     parameters=(Parameter("drift", "1", "change of the gain over the recording"),),
-    corrects=True,
-    named=False,
     needs=("current", "time"),
 )

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, sigma
+from fluxproof.diagnosis.effects import MeasurementError, Parameter, current_error, one, sigma
 
 
 def _slope(view):
@@ -11,7 +11,7 @@ def _slope(view):
     return np.gradient(view.i, axis=1) / view.sample_time_s + 1j * view.omega * view.i
 
 
-class CurrentLag(Effect):
+class CurrentLag(MeasurementError):
     def core(self, view):
         return {"tau": current_error(view, -_slope(view))}
 
@@ -20,6 +20,9 @@ class CurrentLag(Effect):
 
     def ceiling(self, nominal):
         return 2.0 * nominal.sample_time_s
+
+    def possible(self, c, covariance, nominal):
+        return c["tau"] >= 0.0
 
     def corrected(self, view, c):
         return view.without_current(view.phases(-c["tau"] * _slope(view)))
@@ -34,11 +37,7 @@ EFFECT = CurrentLag(
     clause="the measured currents were delayed, as by a filter before the converters",
     equation="i_measured + tau di_measured/dt = i",
     signature="order 0: the whole current vector rotated by omega tau, and smaller by its square",
-    confounders=("sampling_skew", "delay", "encoder_offset"),
     separated_by="load at two speeds; a step of the current",
     parameters=(Parameter("tau_s", "s", "time constant"),),
-    corrects=True,
-    positive=True,
-    named=False,
     needs=("samples", "current"),
 )

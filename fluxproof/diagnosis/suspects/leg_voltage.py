@@ -3,11 +3,11 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.catalogue.current_offset import PATTERNS
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, voltage
+from fluxproof.diagnosis.effects import Effect, Orders, Parameter, voltage
 from fluxproof.diagnosis.ground.result import Estimate
+from fluxproof.plant.transforms import PATTERNS
 
-LEGS = {name: np.array(weights) for name, weights in PATTERNS.items() if name != "zero"}
+LEGS = {name: np.array(weights) for name, weights in PATTERNS.items()}
 
 
 class LegVoltage(Effect):
@@ -36,10 +36,8 @@ EFFECT = LegVoltage(
     clause="the legs of the inverter had different voltage errors, as with unequal gate-driver delays",
     equation="u = u_recorded - e_abc, constant in the stator frame",
     signature="order 1 in dq, the same at every speed and current",
-    confounders=("current_offset", "encoder_eccentricity"),
     separated_by="two speeds: offsets of the sensors also appear proportional to the speed",
     parameters=(Parameter("volts", "V", "difference of the legs", "difference"),),
-    named=False,
-    shows_at=(1.0,),
     needs=("harmonics", "inverter"),
+    shows_at=Orders((1.0,)),
 )

@@ -11,7 +11,7 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.quantised_angle import mean_of_wave
 from fluxproof.diagnosis.balance.view import HALF_WIDTH
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, angle_error, one
+from fluxproof.diagnosis.effects import MeasurementError, Orders, Parameter, angle_error, one
 
 
 def _waves(view):
@@ -19,7 +19,7 @@ def _waves(view):
     return {"sin": kept * np.sin(2.0 * view.theta), "cos": kept * np.cos(2.0 * view.theta)}
 
 
-class ResolverSignals(Effect):
+class ResolverSignals(MeasurementError):
     def core(self, view):
         return {name: angle_error(view, wave) for name, wave in _waves(view).items()}
 
@@ -46,11 +46,8 @@ EFFECT = ResolverSignals(
     clause="the angle came from a resolver with unequal sine and cosine",
     equation="theta_measured = theta_e + a sin(2 theta_e) + b cos(2 theta_e)",
     signature="orders 2 and -2, proportional to speed, without current too",
-    confounders=("current_gain", "phase_resistance_asymmetry", "encoder_eccentricity"),
     separated_by="rotation at zero current at two speeds; amplitudes of sine and cosine over a turn",
     parameters=(Parameter("amplitude_rad", "rad", "electrical, twice per electrical turn", "amplitude"),),
-    corrects=True,
-    named=False,
-    shows_at=(2.0, -2.0),
     needs=("harmonics", "angle"),
+    shows_at=Orders((2.0, -2.0)),
 )

@@ -1,19 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """An angle sensor that turns against the rotor with the torque, as behind a soft shaft or coupling."""
 
-import numpy as np
-
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, angle_error, one, rated_torque, sigma
+from fluxproof.diagnosis.effects import MeasurementError, Parameter, angle_error, one, sigma
+from fluxproof.diagnosis.ground.machine import airgap_torque, rated_torque
 
 SETTLED = 4  # steps until turn and torque agree
 
 
 def _load(view):
     """Air-gap torque at the samples over the rated one, (b, m+1)."""
-    return 1.5 * view.machine.pole_pairs * (np.conj(view.psi) * view.i).imag / rated_torque(view.nominal)
+    return airgap_torque(view.machine, view.psi, view.i) / rated_torque(view.machine)
 
 
-class ShaftTwist(Effect):
+class ShaftTwist(MeasurementError):
     def core(self, view):
         return {"twist": angle_error(view, _load(view))}
 
@@ -39,10 +38,7 @@ EFFECT = ShaftTwist(
     clause="the angle sensor twisted against the rotor with the torque, as with a soft shaft",
     equation="theta_measured = theta_e + k T",
     signature="order 0: omega psi_m k T on the d axis, odd in i_q: like an error of L_q with a cross-saturation",
-    confounders=("inductance_q", "cross_saturation", "encoder_offset"),
     separated_by="i_d of both signs at one torque; the angle against a second sensor, loaded and unloaded",
     parameters=(Parameter("twist_rad", "rad", "electrical, at rated torque", "twist"),),
-    corrects=True,
-    named=False,
     needs=("angle",),
 )

@@ -3,15 +3,16 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import Effect, Parameter, current_error, one, sigma
+from fluxproof.diagnosis.effects import Alternatives, FreeCurve, Orders, Parameter, current_error, one, sigma
+from fluxproof.plant.transforms import ANGLES, linear_limit
 
-PHASES = {"a": 0.0, "b": 2.0 * np.pi / 3.0, "c": -2.0 * np.pi / 3.0}
+PHASES = "abc"
 LAG_S = 1e-4  # time in which the current of the short follows its EMF, L / R of the shorted turns
 
 
 def _short(view, phase):
     """{"": column of the resistive current, "_lag": of its lag} of one phase, per siemens referred to the phase."""
-    axis = np.exp(1j * (PHASES[phase] - view.theta))
+    axis = np.exp(1j * (ANGLES[phase] - view.theta))
     columns = {}
     for name, turned in {"": 1.0, "_lag": -1j * view.omega * LAG_S}.items():
         emf = (1j * view.omega * turned * view.psi * np.conj(axis)).real
@@ -19,7 +20,9 @@ def _short(view, phase):
     return columns
 
 
-class ShortedTurns(Effect):
+class ShortedTurns(FreeCurve, Alternatives):
+    one_of = tuple((phase, f"{phase}_lag") for phase in PHASES)
+
     def core(self, view):
         return {phase: _short(view, phase)[""] for phase in PHASES}
 
@@ -36,7 +39,7 @@ class ShortedTurns(Effect):
 
     @staticmethod
     def _rated_emf(nominal):
-        return nominal.inverter.dc_bus_v / np.sqrt(3)
+        return linear_limit(nominal.inverter.dc_bus_v)
 
     def possible(self, c, covariance, nominal):
         """A short consumes power."""
@@ -56,11 +59,8 @@ EFFECT = ShortedTurns(
     clause="turns of one phase were shorted",
     equation="i = i_terminal - (2/3) g Re(j omega psi e^(-j phase)) e^(j phase)",
     signature="orders 0 and -2 of equal size, proportional to omega^2, and a drag torque",
-    confounders=("iron_loss", "phase_resistance_asymmetry", "current_gain"),
     separated_by="standstill, where a short vanishes but a resistance or gain error of one phase does not",
     parameters=tuple(Parameter(f"conductance_{x}_s", "S", f"of the short, referred to phase {x}") for x in PHASES),
-    named=False,
-    one_of=tuple((phase, f"{phase}_lag") for phase in PHASES),
-    shows_at=(0.0, 2.0),
     needs=("harmonics", "angle"),
+    shows_at=Orders((0.0, 2.0)),
 )

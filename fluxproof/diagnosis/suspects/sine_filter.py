@@ -3,13 +3,15 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.effect import DOUBT, Effect, Parameter, current_error, one, sigma, voltage
+from fluxproof.diagnosis.effects import DOUBT, FreeCurve, Parameter, current_error, one, sigma, voltage
+from fluxproof.diagnosis.ground.machine import steady_voltage
+from fluxproof.plant.transforms import linear_limit
 
 CHOKE = 0.02  # of the machine's inductance and resistance: those of the choke of a filter that is just of interest
 
 
 def _rated_voltage(nominal):
-    return nominal.inverter.dc_bus_v / np.sqrt(3)
+    return linear_limit(nominal.inverter.dc_bus_v)
 
 
 def _rated_speed(nominal):
@@ -18,9 +20,9 @@ def _rated_speed(nominal):
     return _rated_voltage(nominal) / np.hypot(m.magnet_flux_wb, m.inductance_q_h * m.rated_current_a)
 
 
-class SineFilter(Effect):
+class SineFilter(FreeCurve):
     def core(self, view):
-        slope = 1j * view.omega * (view.machine.resistance_ohm * view.i + 1j * view.omega * view.psi)
+        slope = 1j * view.omega * steady_voltage(view.machine, view.i, view.omega, view.psi)
         return {"capacitance": current_error(view, slope)}
 
     def free(self, view):
@@ -57,9 +59,7 @@ EFFECT = SineFilter(
     clause="a sine filter or a long cable was connected between inverter and machine",
     equation="i_measured = i + C du/dt, u_measured = u + R_f i + L_f di/dt",
     signature="order 0: i_d larger by omega C u_q, i_q smaller by omega C u_d, in proportion to omega^2",
-    confounders=("iron_loss", "current_scale", "magnet_flux"),
     separated_by="zero current at two speeds",
     parameters=(Parameter("capacitance_f", "F", "of each phase, in star"),),
-    named=False,
     needs=("current",),
 )

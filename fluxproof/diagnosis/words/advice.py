@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 
+from fluxproof.diagnosis.effects import MeasurementError
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.quantities import RPM, decimals, fixed
 from fluxproof.diagnosis.words.phrases import CORRECTED, SIGNALS, capital, corrected, joined
@@ -75,7 +76,7 @@ def _take(answer, nominal, effects) -> str:
         return f"Use drive_improved.toml, which applies this interpretation{found}, and diagnose again.{rivals}"
     if not any(e.plant for e in answer.effects):
         return "Correct the recording as stated: the drive file has no key for these effects."
-    trims = any(e.name in effects and effects[e.name].corrects for e in answer.effects)
+    trims = any(isinstance(effects.get(e.name), MeasurementError) for e in answer.effects)
     later = " Measurement errors remain in this recording; the trims act from the next recording on." if trims else ""
     whole_periods = "".join(f" {text}" for text in _periods(answer, nominal, effects))
     return f"Simulate with drive_improved.toml, which contains the identified values.{later}{whole_periods}"
@@ -149,7 +150,7 @@ def _where(answer, nominal, effects) -> str:
 
 def shows(effect, order, pole_pairs) -> bool:
     """Whether an effect appears at an electrical order, by its declaration."""
-    orders = [*effect.shows_at, *(n / pole_pairs for n in effect.shows_at_turns)]
+    orders = [*effect.shows_at.electrical, *(n / pole_pairs for n in effect.shows_at.per_turn)]
     return any(abs(abs(order) - h) <= NEAR * h for h in orders if h)
 
 

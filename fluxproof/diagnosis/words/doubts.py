@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from fluxproof.diagnosis.effects.effect import believable, plausible_range
+from fluxproof.diagnosis.effects import believable, plausible_range
 from fluxproof.diagnosis.ground.quantities import ascii_of, quantity
 from fluxproof.diagnosis.words.phrases import capital, size_text, title_of
 

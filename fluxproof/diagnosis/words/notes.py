@@ -13,6 +13,7 @@ from fluxproof.diagnosis.decide.decision import (
     Decision,
     Withheld,
 )
+from fluxproof.diagnosis.effects.drive_file import caveat
 from fluxproof.diagnosis.words.balance_notes import balance_notes
 from fluxproof.diagnosis.words.one_point_notes import one_point_notes
 from fluxproof.diagnosis.words.phrases import as_if, capital, percent_below, title_of
@@ -53,7 +54,7 @@ def _of_balance(decision: Decision, basis: Basis) -> list[str]:
     if basis.posterior is None:
         return []
     best, effects = basis.posterior.best(), basis.posterior.setup.effects
-    caveats = (effects[e.name].caveat(basis.view, best.c[e.name]) for e in decision.effects)
+    caveats = (caveat(effects[e.name], basis.view, best.c[e.name]) for e in decision.effects)
     return [*balance_notes(basis.view, basis.held, effects, decision.ambiguity), *filter(None, caveats)]
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from fluxproof.diagnosis.balance.cells import voltage_level
+from fluxproof.diagnosis.effects import FarStart
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.converge import around, converged, fit_at
 from fluxproof.diagnosis.inference.fitted_set import FittedSet, possible
@@ -19,7 +20,7 @@ def far(judged: Judged, best: Names):
     means = (setup.cells.channel == "u") & (setup.cells.order == 0.0)
     if np.sum(setup.cells.y[means] ** 2) < k.FAR**2 * np.sum(voltage_level(setup.view) ** 2):
         return
-    for name in judged.first.able():
+    for name in (n for n in judged.first.able() if isinstance(setup.effects[n], FarStart)):
         fit = _approached(setup, name)
         if fit is not None and fit.value > judged.fits[(name,)].value:
             judged.fits[(name,)] = replace(fit, own=True)

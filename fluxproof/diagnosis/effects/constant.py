@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Part of effects that are a wrong constant: of the drive file or of a sensor's scale."""
+
+from __future__ import annotations
+
+from fluxproof.diagnosis.effects.effect import Effect
+
+LEAST_LEFT = 0.1  # of a parameter of the machine: a smaller one is not this machine
+
+
+class Constant(Effect):
+    """A constant of the nominal drive or a scale that is wrong; it competes with mistaken units of the same signal."""
+
+    rescales: tuple[str, ...] = ()  # signals and [machine] keys that it scales or offsets: i, u, u_dc, theta_e, ...
+    exact: bool = True  # its formula cannot be wrong: no error of a formula is assumed
+
+    def too_large(self, c, view):
+        return super().too_large(c, view) or self.leaves_nothing(c, view.machine)
+
+    def leaves_nothing(self, c, machine) -> bool:
+        """Whether the first coefficient makes a parameter of the machine negative or nearly zero."""
+        values = [getattr(machine, key) for key in self.rescales if hasattr(machine, key)]
+        return any(value + next(iter(c.values())) < LEAST_LEFT * value for value in values)
+
+
+def is_exact(effect) -> bool:
+    """Whether no error of its formula is assumed."""
+    return isinstance(effect, Constant) and effect.exact
+
+
+def rescaled(effect) -> frozenset[str]:
+    """Signals and keys of [machine] that an effect scales or offsets."""
+    return frozenset(effect.rescales) if isinstance(effect, Constant) else frozenset()
