@@ -13,7 +13,8 @@ from cocotb_tests.support.drives import PAPER, edited, row_of
 from cocotb_tests.support.needs import ghdl5_missing
 from fluxproof.checkout import ROOT
 from fluxproof.cosim import ghdl
-from fluxproof.cosim.closed_loop import INPUT_PORTS, gate_words
+from fluxproof.cosim.closed_loop import gate_words
+from fluxproof.cosim.driven_plant import INPUT_PORTS
 from fluxproof.cosim.golden_clock import SEEN, GoldenClock
 from golden_model import drive as drives
 from golden_model import fluxproof

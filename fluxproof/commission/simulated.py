@@ -16,7 +16,7 @@ import numpy as np
 from fluxproof.commission.bus import CODES, VALUES, checked
 from fluxproof.commission.simulated_edges import edges_of
 from fluxproof.commission.simulated_loop import FIELDS, INPUTS, LAST_ANGLE, REFERENCED, Around, Memory, advance
-from fluxproof.cosim.closed_loop import described_sensors
+from fluxproof.cosim.driven_plant import described_sensors
 from fluxproof.plant import (
     FREE,
     IMPOSED_SPEED,

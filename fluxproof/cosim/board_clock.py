@@ -10,7 +10,6 @@ without a clock, changes between two clocks here (io/power_stage.vhd).
 
 from __future__ import annotations
 
-from collections import namedtuple
 from typing import NamedTuple
 
 import numpy as np
@@ -86,9 +85,24 @@ class State(NamedTuple):
     wires: Wires = Wires()
 
 
-# Registers of the core that the front ends and the interrupt read
-OF_THE_CORE = ("reverse", "omega_given", "speed_given", "irq_mask", "irq_clear")
-BoardRegisters = namedtuple("BoardRegisters", (*board_map.settings(), *OF_THE_CORE))
+class BoardRegisters(NamedTuple):
+    """The registers that the front ends, the snapshot and the interrupt read."""
+
+    position: tuple  # position_front.Registers
+    converters: tuple  # current_front.Registers
+    # Of the core
+    reverse: int
+    omega_given: int
+    speed_given: int
+    irq_mask: int
+    irq_clear: int
+    # Of the board
+    clear_encoder: int
+    take_snapshot: int
+    position_source: int
+    forced_angle: int
+    forced_rate: int
+    board_ignore: int
 
 
 @kernel
@@ -103,7 +117,7 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
             position_in=p[7], sample_trigger=w.trigger, codes_valid=w.codes_done, clear_encoder=b.clear_encoder,
             omega_set=b.omega_given, reverse=b.reverse,
         ),
-        b,
+        b.position,
         encoder,
         position_bits,
     )  # fmt: skip
@@ -114,7 +128,7 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
             mod_clock_in=p[c + 6], code_a_in=p[c + 7], code_b_in=p[c + 8], code_c_in=p[c + 9],
             code_u_dc_in=p[c + 10], codes_valid_in=p[c + 11], sample_trigger=w.trigger, clear_encoder=b.clear_encoder,
         ),
-        b,
+        b.converters,
         currents,
         adc_bits,
         lines,
@@ -293,8 +307,11 @@ class BoardClock:
         return self.registers.settings()
 
     def _board(self) -> BoardRegisters:
-        values = self.registers.values
-        return BoardRegisters(*(values.get(name, 0) for name in BoardRegisters._fields))
+        def record(of, **parts):
+            return of(**parts, **{name: self.registers.values.get(name, 0) for name in of._fields if name not in parts})
+
+        position, converters = record(position_front.Registers), record(current_front.Registers)
+        return record(BoardRegisters, position=position, converters=converters)
 
     def _take_due(self) -> None:
         """Results of a sample and registers that change with the clock that has passed."""

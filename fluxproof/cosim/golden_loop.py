@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fluxproof.cosim.closed_loop import Result, Scenario, described_sensors, load_torque
+from fluxproof.cosim.closed_loop import Result
+from fluxproof.cosim.driven_plant import Scenario, described_sensors, load_torque
 from fluxproof.plant import (
     FREE,
     Inverter,

@@ -16,7 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fluxproof.checkout import recordings
-from fluxproof.cosim.closed_loop import INPUT_PORTS, Comparison, Device, Result, build_plant
+from fluxproof.cosim.closed_loop import Comparison, Device, Result
+from fluxproof.cosim.driven_plant import INPUT_PORTS, build_plant
 from fluxproof.cosim.scenarios import RPM
 from fluxproof.plant import sensor_params
 from fluxproof.plant.sensors import current_code, position_code, u_dc_code

@@ -26,16 +26,8 @@ import numpy as np
 
 from fluxproof.checkout import BUILD, ROOT
 from fluxproof.cosim import ghdl
-from fluxproof.cosim.closed_loop import (
-    INPUT_PORTS,
-    Device,
-    GoldenPeriods,
-    PlantPeriods,
-    Result,
-    Scenario,
-    cosimulate,
-    run_now,
-)
+from fluxproof.cosim.closed_loop import Device, GoldenPeriods, Result, cosimulate, run_now
+from fluxproof.cosim.driven_plant import INPUT_PORTS, PlantPeriods, Scenario
 from fluxproof.cosim.scenarios import SCENARIOS
 from fluxproof.files import write_json
 from fluxproof.plant import FREE, Machine, Sensors

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from fluxproof.cosim.closed_loop import Scenario
+from fluxproof.cosim.driven_plant import Scenario
 from golden_model.drive import Drive
 from golden_model.units import from_si
 

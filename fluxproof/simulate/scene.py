@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fluxproof.cosim.closed_loop import Scenario
+from fluxproof.cosim.driven_plant import Scenario
 from fluxproof.cosim.scenarios import RPM, scenario
 from fluxproof.plant.transforms import linear_limit
 from golden_model.drive import Drive

@@ -15,7 +15,8 @@ from types import MappingProxyType
 import numpy as np
 
 from fluxproof.checkout import DRIVES
-from fluxproof.cosim.closed_loop import INPUT_PORTS, GoldenPeriods, PlantPeriods
+from fluxproof.cosim.closed_loop import GoldenPeriods
+from fluxproof.cosim.driven_plant import INPUT_PORTS, PlantPeriods
 from fluxproof.cosim.golden_clock import SEEN, GoldenClock
 from fluxproof.cosim.runs import closed_loop, generics
 from fluxproof.cosim.values import random_value

@@ -23,7 +23,7 @@ import numpy as np
 import pandas as pd
 
 from fluxproof.checkout import BUILD, ROOT
-from fluxproof.cosim.closed_loop import Scenario
+from fluxproof.cosim.driven_plant import Scenario
 from fluxproof.diagnosis.replay.capture import capture
 from fluxproof.diagnosis.replay.telemetry_columns import electrical_angle
 from fluxproof.files import write_json

@@ -22,7 +22,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from fluxproof.checkout import BUILD, DRIVES, ROOT
-from fluxproof.cosim.closed_loop import Scenario
+from fluxproof.cosim.driven_plant import Scenario
 from fluxproof.cosim.golden_loop import simulate
 from fluxproof.cosim.runs import ClosedLoop, InVerilator, Named
 from fluxproof.cosim.scenarios import SCENARIOS

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from fluxproof.commission.simulated import Board, SimulatedBus
-from fluxproof.cosim.closed_loop import described_sensors
+from fluxproof.cosim.driven_plant import described_sensors
 from fluxproof.plant import Inverter, Machine
 from golden_model import drive as drives
 from golden_model.front_ends import Encoder

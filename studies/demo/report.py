@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import jinja2
 import numpy as np
 
-from fluxproof.cosim.closed_loop import Scenario
+from fluxproof.cosim.driven_plant import Scenario
 from fluxproof.cosim.scenarios import RPM
 from fluxproof.files import write_text
 from golden_model.drive import Drive

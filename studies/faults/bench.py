@@ -14,7 +14,8 @@ from typing import Protocol
 import numpy as np
 
 from fluxproof.checkout import ROOT
-from fluxproof.cosim.closed_loop import INPUT_PORTS, SAMPLE_DELAY, build_plant, gate_words
+from fluxproof.cosim.closed_loop import SAMPLE_DELAY, gate_words
+from fluxproof.cosim.driven_plant import INPUT_PORTS, build_plant
 from fluxproof.cosim.golden_clock import SEEN, GoldenClock
 from fluxproof.cosim.scenarios import RPM
 from fluxproof.plant import sensor_params

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.cosim.closed_loop import Scenario
+from fluxproof.cosim.driven_plant import Scenario
 from fluxproof.cosim.scenarios import RPM, scenario
 from fluxproof.plant import IMPOSED_SPEED
 from studies.papers.flux_bench import (

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fluxproof.cosim.closed_loop import Scenario
+from fluxproof.cosim.driven_plant import Scenario
 from fluxproof.cosim.runs import ClosedLoop, InGhdl, InVerilator, Named
 from fluxproof.cosim.scenarios import RPM, scenario
 from fluxproof.plant import Machine

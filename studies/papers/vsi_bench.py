@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fluxproof.checkout import ROOT
-from fluxproof.cosim.closed_loop import Result, Scenario
+from fluxproof.cosim.closed_loop import Result
+from fluxproof.cosim.driven_plant import Scenario
 from fluxproof.cosim.golden_loop import simulate
 from fluxproof.cosim.scenarios import RPM, scenario
 from fluxproof.plant import IMPOSED_SPEED, Inverter, Machine

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fluxproof.cosim.closed_loop import Scenario
+from fluxproof.cosim.driven_plant import Scenario
 from fluxproof.cosim.golden_loop import simulate
 from fluxproof.cosim.scenarios import RPM
 from fluxproof.diagnosis.ground.recording import Recording, from_columns

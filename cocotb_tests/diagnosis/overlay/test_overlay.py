@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.drives import PAPER
-from fluxproof.cosim.closed_loop import described_sensors
+from fluxproof.cosim.driven_plant import described_sensors
 from fluxproof.cosim.scenarios import RPM, scenario, steps
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import RecordingError, from_columns

@@ -18,7 +18,7 @@ import numpy as np
 
 from cocotb_tests.support.board.pins_model import Motor, Pins
 from fluxproof.cosim.board_clock import BUS, PINS, SEEN, STATUS, BoardClock, GoldenBlocks
-from fluxproof.cosim.closed_loop import build_plant
+from fluxproof.cosim.driven_plant import build_plant
 from fluxproof.plant import sensor_params
 from golden_model.board_registers import board_generics, board_registers
 from golden_model.drive import Drive, with_carrier

@@ -8,7 +8,8 @@ import dataclasses
 import numpy as np
 
 from cocotb_tests.support.drives import PAPER
-from fluxproof.cosim.closed_loop import GoldenPeriods, Scenario, cosimulate, run_now
+from fluxproof.cosim.closed_loop import GoldenPeriods, cosimulate, run_now
+from fluxproof.cosim.driven_plant import Scenario
 from fluxproof.cosim.scenarios import RPM
 from golden_model import drive as drives
 from golden_model.io.fault_latch import NAMES

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 from cocotb_tests.support.host.piped_board import Board
-from fluxproof.cosim.closed_loop import FLAGS, INPUT_PORTS, GoldenPeriods
+from fluxproof.cosim.closed_loop import FLAGS, GoldenPeriods
+from fluxproof.cosim.driven_plant import INPUT_PORTS
 from golden_model import fluxproof
 from golden_model.io.register_file import RegisterFile
 from golden_model.registers import registers

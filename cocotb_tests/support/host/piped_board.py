@@ -11,7 +11,7 @@ import os
 import subprocess
 from pathlib import Path
 
-from fluxproof.cosim.closed_loop import build_plant
+from fluxproof.cosim.driven_plant import build_plant
 from fluxproof.plant import sensor_params
 from fluxproof.plant.sensors import current_code, position_code, u_dc_code
 from golden_model.io import register_map

@@ -12,7 +12,8 @@ from cocotb.triggers import ClockCycles, FallingEdge, First, ReadOnly, RisingEdg
 from cocotbext.axi import AxiLiteBus, AxiLiteMaster, AxiResp, AxiStreamBus, AxiStreamSink
 
 from fluxproof.cosim.block_bench import read
-from fluxproof.cosim.closed_loop import FLAGS, SAMPLE_DELAY, Period, Scenario
+from fluxproof.cosim.closed_loop import FLAGS, SAMPLE_DELAY, Period
+from fluxproof.cosim.driven_plant import Scenario
 from fluxproof.cosim.ghdl_device import CLOCK_NS, now
 from fluxproof.cosim.inside import handle_of
 from golden_model.fluxproof import OBSERVED, Observed

@@ -13,7 +13,8 @@ import numpy as np
 from cocotb.triggers import FallingEdge
 
 from fluxproof.cosim.block_bench import read
-from fluxproof.cosim.closed_loop import INPUT_PORTS, cosimulate
+from fluxproof.cosim.closed_loop import cosimulate
+from fluxproof.cosim.driven_plant import INPUT_PORTS
 from fluxproof.cosim.ghdl_device import GhdlDevice, prepare
 from fluxproof.cosim.scenarios import SCENARIOS
 from fluxproof.cosim.values import random_value

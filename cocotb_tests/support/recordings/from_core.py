@@ -13,7 +13,7 @@ import functools
 import numpy as np
 
 from cocotb_tests.support.drives import PAPER
-from fluxproof.cosim.closed_loop import Scenario, described_sensors
+from fluxproof.cosim.driven_plant import Scenario, described_sensors
 from fluxproof.cosim.golden_loop import simulate
 from fluxproof.diagnosis.ground.recording import Recording, from_columns
 from fluxproof.diagnosis.replay.capture import capture

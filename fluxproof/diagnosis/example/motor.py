@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fluxproof.cosim.closed_loop import Scenario, described_sensors
+from fluxproof.cosim.driven_plant import Scenario, described_sensors
 from fluxproof.plant import Inverter, Machine, Sensors
 from golden_model.drive import Drive
 from golden_model.units import si_per_lsb

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.cosim.closed_loop import Scenario, described_sensors
+from fluxproof.cosim.driven_plant import Scenario, described_sensors
 from fluxproof.cosim.golden_loop import mixed_kernel
 from fluxproof.plant import (
     Inverter,
