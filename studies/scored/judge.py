@@ -6,7 +6,7 @@ wrong          an effect that is not there, or of another size, or of a size com
                cause is missing; an alarm where all agrees; an improved drive equal to the given one; a crash
 right          every cause is named
 covering       every cause is named or is in an ambiguity, or the headline of an unexplained misfit describes it
-honest limit   refused, and the message names the true reason
+honest limit   refused, or unexplained where no cause is known, and the message names the true reason
 withheld       the rest: refused for another reason, unexplained, or part of the causes
 """
 
@@ -37,7 +37,7 @@ def judge(answer: dict, truth: Truth, machine: dict) -> tuple[str, str]:
         faults.append("drive_improved.toml equals the given drive file")
     if faults:
         return "wrong", "; ".join(faults)
-    return _healthy(answer, truth) if not truth.causes else _caused(answer, truth, headline)
+    return _healthy(answer, truth, headline) if not truth.causes else _caused(answer, truth, headline)
 
 
 def headline_of(answer: dict) -> str:
@@ -91,7 +91,7 @@ def corrections(answer) -> list[str]:
     return [p["message"] for p in answer["recording"]["problems"] if p["action"] in CORRECTED]
 
 
-def _healthy(answer, truth):
+def _healthy(answer, truth, headline):
     if answer["ambiguity"] or answer["effects"]:
         return "covering", "names what is there and of no interest"
     if answer["verdict"] == "no_mismatch":
@@ -99,6 +99,8 @@ def _healthy(answer, truth):
     if answer["verdict"] in ("explained", "ambiguous") and answer["conventions"]:
         open_ = any(c["rivals"] for c in answer["conventions"])
         return ("covering", "a reading beside others") if open_ else ("right", "the reading is told")
+    if _any([truth.limit], said(headline)):
+        return "honest limit", "unexplained, and the headline names the true reason"
     return "wrong", f"false alarm: {answer['verdict']}"
 
 
