@@ -31,13 +31,13 @@ def judge(answer: dict, truth: Truth, machine: dict) -> tuple[str, str]:
     if "refused" in answer or answer["verdict"] == "bad_recording":
         return _refused(answer, truth, headline)
     faults = [*_false_effects(answer, truth, machine), *_false_groups(answer, truth), *_false_readings(answer, truth)]
-    if truth.tells and not re.search(truth.tells, headline, re.IGNORECASE):
+    if truth.tells and not _any([truth.tells], answer["sentence"]):
         faults.append("rests on a guess that the headline does not tell")
     if answer.get("improved") == "same" and CALLS_FOR_IT in answer["advice"]:
         faults.append("drive_improved.toml equals the given drive file")
     if faults:
         return "wrong", "; ".join(faults)
-    return _healthy(answer, truth, headline) if not truth.causes else _caused(answer, truth, headline)
+    return _healthy(answer, truth) if not truth.causes else _caused(answer, truth, headline)
 
 
 def headline_of(answer: dict) -> str:
@@ -91,7 +91,7 @@ def corrections(answer) -> list[str]:
     return [p["message"] for p in answer["recording"]["problems"] if p["action"] in CORRECTED]
 
 
-def _healthy(answer, truth, headline):
+def _healthy(answer, truth):
     if answer["ambiguity"] or answer["effects"]:
         return "covering", "names what is there and of no interest"
     if answer["verdict"] == "no_mismatch":
@@ -99,7 +99,7 @@ def _healthy(answer, truth, headline):
     if answer["verdict"] in ("explained", "ambiguous") and answer["conventions"]:
         open_ = any(c["rivals"] for c in answer["conventions"])
         return ("covering", "a reading beside others") if open_ else ("right", "the reading is told")
-    if _any([truth.limit], said(headline)):
+    if _any([truth.limit], said(answer["sentence"])):
         return "honest limit", "unexplained, and the headline names the true reason"
     return "wrong", f"false alarm: {answer['verdict']}"
 
