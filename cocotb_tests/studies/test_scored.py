@@ -87,6 +87,7 @@ def test_an_answer_where_a_cause_is_true(given, expected):
         (answer("explained", [effect("dead_time", "v_dead_v", 0.8, 0.1, "V")], sentence="rpm"), "covering"),
         (answer("no_mismatch"), "wrong"),  # the guess is not told
         (answer("unexplained", sentence="rpm"), "wrong"),
+        (answer("unexplained", sentence="rpm, the gates are off from row 7"), "honest limit"),
         (answer("explained", [effect()], sentence="rpm"), "wrong"),
     ],
 )

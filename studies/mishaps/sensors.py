@@ -12,6 +12,7 @@ from studies.scored.truth import Cause
 
 CHANNEL = r"stuck|constant|dead|i_a|nought|zero|sum|frozen|clip"
 SENSORS = (Cause(("current_gain",)), Cause(("current_offset",)), Cause(("current_scale",)), Cause(("udc_gain",)))
+LATE, LAG = (Cause(("sampling_skew",)), Cause(("delay",))), r"\blate\b|\blag|delay"
 WARM = r"temp|winding|sensor"
 
 
@@ -96,8 +97,8 @@ MISHAPS = (
            limit="time"),
     Mishap("spikes", "dq", _spikes, readings=r"spike|outlier|beyond"),
     Mishap("ordinary sensors", "phases", _ordinary, beside=SENSORS),
-    Mishap("i_q three rows late", "dq", _late("i_q", 3)),
-    Mishap("u_q two rows late", "dq", _late("u_q_ref", 2)),
+    Mishap("i_q three rows late", "dq", _late("i_q", 3), beside=LATE, limit=LAG),
+    Mishap("u_q two rows late", "dq", _late("u_q_ref", 2), beside=LATE, limit=LAG),
     Mishap("voltages of the message before", "slow", then(*(_late(n, 2) for n in U_DQ))),
     Mishap("temperature sensor open", "slow", _warm(-273.1), readings=WARM, limit=WARM, never=r"from [-−]\d\d"),
     Mishap("temperature sensor at nought", "slow", _warm(0.0), readings=WARM),

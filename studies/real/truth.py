@@ -7,7 +7,7 @@ recorded, all of them are names of one cause.  ``files`` of a case finds the rec
 
 from __future__ import annotations
 
-from studies.real import files as f
+import studies.real.files as f
 from studies.scored.truth import Case, Cause, Truth
 
 WIDE = {"resistance_ohm": (0.27, 0.41)}

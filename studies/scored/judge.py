@@ -6,7 +6,7 @@ wrong          an effect that is not there, or of another size, or of a size com
                cause is missing; an alarm where all agrees; an improved drive equal to the given one; a crash
 right          every cause is named
 covering       every cause is named or is in an ambiguity, or the headline of an unexplained misfit describes it
-honest limit   refused, and the message names the true reason
+honest limit   refused, or unexplained where no cause is known, and the message names the true reason
 withheld       the rest: refused for another reason, unexplained, or part of the causes
 """
 
@@ -31,7 +31,7 @@ def judge(answer: dict, truth: Truth, machine: dict) -> tuple[str, str]:
     if "refused" in answer or answer["verdict"] == "bad_recording":
         return _refused(answer, truth, headline)
     faults = [*_false_effects(answer, truth, machine), *_false_groups(answer, truth), *_false_readings(answer, truth)]
-    if truth.tells and not re.search(truth.tells, headline, re.IGNORECASE):
+    if truth.tells and not _any([truth.tells], answer["sentence"]):
         faults.append("rests on a guess that the headline does not tell")
     if answer.get("improved") == "same" and CALLS_FOR_IT in answer["advice"]:
         faults.append("drive_improved.toml equals the given drive file")
@@ -99,6 +99,8 @@ def _healthy(answer, truth):
     if answer["verdict"] in ("explained", "ambiguous") and answer["conventions"]:
         open_ = any(c["rivals"] for c in answer["conventions"])
         return ("covering", "a reading beside others") if open_ else ("right", "the reading is told")
+    if _any([truth.limit], said(answer["sentence"])):
+        return "honest limit", "unexplained, and the headline names the true reason"
     return "wrong", f"false alarm: {answer['verdict']}"
 
 
