@@ -14,16 +14,17 @@ from cocotb_tests.support.recordings.from_core import GRID, MACHINE, columns
 from cocotb_tests.support.slow import slowly
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis.ground import constants
-from studies.sensitivity.run import OF_ONE_POINT, Case, answers_of, names, said_in_full, shares
+from studies.sensitivity.run import OF_FLEETS, OF_ONE_POINT, Case, answers_of, names, said_in_full, shares
 from studies.sensitivity.steps import Steps, recorded, varied
 
 
 def test_every_constant_is_varied():
     declared = {t.id for node in ast.parse(Path(constants.__file__).read_text()).body if isinstance(node, ast.Assign)
                 for target in node.targets for t in ast.walk(target) if isinstance(t, ast.Name)}  # fmt: skip
-    assert declared == set(names()) | set(OF_ONE_POINT)
+    assert declared == set(names()) | set(OF_ONE_POINT) | set(OF_FLEETS)
     text = (ROOT / "docs" / "diagnosis.md").read_text()
-    assert f"its reason: {len(names())}, and {len(OF_ONE_POINT)} more of one operating point" in text
+    beside = f"{len(OF_ONE_POINT)} more of one operating point and {len(OF_FLEETS)} of fleets"
+    assert f"its reason: {len(names())}, {beside}" in text
 
 
 def test_no_constant_is_imported_by_value():

@@ -30,10 +30,17 @@ OF_ONE_POINT = (
     *("CONSTANT_DC", "CONSTANT_U", "FITS"),
 )
 
+# Read by the analysis of a fleet alone.
+OF_FLEETS = (
+    *("FLEET_FALSE", "DRIFT_ALARM", "DRIFT_CONFIDENCE", "DRIFT_RECORDINGS", "GROUP_APART", "GROUP_DRIVES", "COMMON"),
+    *("OUTLIER_DRIVES", "POPULATION_DRIVES", "FAULTY_WIDE", "MOST_FAULTY", "ONE_FAULTY_IN", "RATE_WORTH", "FLEET_EVEN"),
+    "USELESS",
+)
+
 
 def names() -> list[str]:
     """The constants that are varied."""
-    return [n for n in vars(constants) if n.isupper() and n not in OF_ONE_POINT]
+    return [n for n in vars(constants) if n.isupper() and n not in OF_ONE_POINT + OF_FLEETS]
 
 
 def said(verdict, effects, ambiguity) -> dict:

@@ -92,7 +92,8 @@ class SlowView(View):
         return phase_values(i_dq * np.exp(1j * self._turn(i_dq.shape[1])))
 
     def from_phases(self, abc):
-        return space_vector(abc) * np.exp(-1j * self._turn(abc.shape[1]))
+        stator = space_vector(abc)
+        return stator * np.exp(-1j * self._turn(abc.shape[1]))
 
 
 def slow_view(recording: Recording, nominal, catalogue: dict | None = None) -> SlowView:

@@ -241,7 +241,8 @@ class View:
 
     def from_phases(self, abc):
         """dq value of phase values (b, k, 3), amplitude-invariant Clarke."""
-        return space_vector(abc) * np.conj(self.turn if abc.shape[1] == self.theta.shape[1] else self.mid_turn)
+        stator = space_vector(abc)
+        return stator * np.conj(self.turn if abc.shape[1] == self.theta.shape[1] else self.mid_turn)
 
     def replace(self, **changes):
         """A copy with other arrays."""

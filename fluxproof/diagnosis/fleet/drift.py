@@ -7,10 +7,10 @@ weighted least squares; g^2 is the reduced chi^2, as recordings of one drive dif
 temperature or mounting does.  The rate is reported if b is significant among all rates (Benjamini-Hochberg).
 It is noticed at the first recording k at which the test of the first k ones has a probability below
 
-    ALPHA (6 / pi^2) / (k - FEWEST + 1)^2
+    DRIFT_ALARM (6 / pi^2) / (k - DRIFT_RECORDINGS + 1)^2
 
-whose sum over all k is ALPHA: looking after each recording does not raise the share of false alarms.  The limit L is
-reached where a + b t = L; its interval is Fieller's: all t at which L is within CONFIDENT of the line.
+whose sum over all k is DRIFT_ALARM: looking after each recording does not raise the share of false alarms.  The limit L
+is reached where a + b t = L; its interval is Fieller's: all t at which L is within DRIFT_CONFIDENCE of the line.
 """
 
 from __future__ import annotations
@@ -21,10 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-ALPHA = 0.01
-FALSE = 0.05  # share of the reported rates that may be false
-FEWEST = 5  # recordings: a line through fewer has hardly a scatter to be judged by
-CONFIDENT = 0.95
+from fluxproof.diagnosis.ground import constants
+
 DAY_S = 86400.0
 FAR_DAYS = 36500.0  # a limit beyond a century is not reported
 LIMITS = {"magnet_flux_wb": "95%", "resistance_ohm": "130%"}  # of the first value; --limit sets others
@@ -87,8 +85,9 @@ def line_of(t, x, s) -> Line:
 
 def noticed_at(t, x, s) -> int | None:
     """Index of the recording after which the drift was noticed for the first time."""
-    for k in range(FEWEST, len(t) + 1):
-        if np.ptp(t[:k]) > 0.0 and line_of(t[:k], x[:k], s[:k]).p < ALPHA * 6.0 / np.pi**2 / (k - FEWEST + 1) ** 2:
+    for k in range(constants.DRIFT_RECORDINGS, len(t) + 1):
+        alarm = constants.DRIFT_ALARM * 6.0 / np.pi**2 / (k - constants.DRIFT_RECORDINGS + 1) ** 2
+        if np.ptp(t[:k]) > 0.0 and line_of(t[:k], x[:k], s[:k]).p < alarm:
             return k - 1
     return None
 
@@ -97,7 +96,7 @@ def reached(line: Line, limit: float) -> tuple[float, float, float] | None:
     """(time, earliest, latest) [days] at which the line meets the limit; None if it moves away from it."""
     if line.b == 0.0 or (at := (limit - line.a) / line.b) < 0.0:
         return None
-    q2 = stats.t.ppf(0.5 + 0.5 * CONFIDENT, line.freedom) ** 2
+    q2 = stats.t.ppf(0.5 + 0.5 * constants.DRIFT_CONFIDENCE, line.freedom) ** 2
     c, d = line.covariance, line.a - limit
     # (d + b t)^2 = q^2 (c00 + 2 c01 t + c11 t^2)
     roots = np.roots([line.b**2 - q2 * c[1, 1], 2.0 * (d * line.b - q2 * c[0, 1]), d**2 - q2 * c[0, 0]])
@@ -118,13 +117,15 @@ def drifts(series: dict, limits: dict[str, str] | None = None) -> list[Drift]:
     for key, points in sorted(series.items()):
         points = sorted(points)
         days = np.array([(p[0] - points[0][0]).total_seconds() / DAY_S for p in points])
-        if len(points) >= FEWEST and np.ptp(days) > 0.0:
+        if len(points) >= constants.DRIFT_RECORDINGS and np.ptp(days) > 0.0:
             x, s = np.array([p[1] for p in points]), np.array([p[2] for p in points])
             ready.append((key, [p[0] for p in points], days, x, s, line_of(days, x, s)))
     if not ready:
         return []
     doubts = stats.false_discovery_control([line.p for *_, line in ready])
-    found = [_drift(*entry, float(q), limits) for entry, q in zip(ready, doubts, strict=True) if q <= FALSE]
+    found = [
+        _drift(*entry, float(q), limits) for entry, q in zip(ready, doubts, strict=True) if q <= constants.FLEET_FALSE
+    ]
     return sorted(found, key=lambda d: (d.doubt, d.serial, d.parameter))
 
 

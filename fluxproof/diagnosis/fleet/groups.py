@@ -3,9 +3,9 @@
 
 The signature of a remainder is a vector with a place for each signal and signed electrical order, whose squares are the
 shares of the remainder's power, and a place for each cause beyond the catalogue that it looks like.  The cosine between
-two signatures is 1 for the same remainder of any size.  Clusters are those of average linkage at the distance APART.
-A recording that leaves next to nothing joins a group if its effects are what the group's cause looks like, and the
-little that is left is alike.
+two signatures is 1 for the same remainder of any size.  Clusters are those of average linkage at the distance
+GROUP_APART.  A recording that leaves next to nothing joins a group if its effects are what the group's cause looks
+like, and the little that is left is alike.
 """
 
 from __future__ import annotations
@@ -20,8 +20,6 @@ from fluxproof.diagnosis.fleet.rates import Weighed
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.suspects import SUSPECTS
 
-APART = 0.35
-FEWEST = 3  # drives of a group
 FAINT = -1.0  # any share left, also of less than the noise
 
 
@@ -71,18 +69,18 @@ def signature(weighed: Weighed | None, least=k.SMALL) -> dict[tuple[str, float],
 
 
 def groups(rows: list[dict], weighed: list[Weighed | None]) -> list[Group]:
-    """The groups of at least FEWEST drives, the largest first."""
+    """The groups of at least GROUP_DRIVES drives, the largest first."""
     found = [(row, w, s) for row, w in zip(rows, weighed, strict=True) if (s := signature(w))]
-    if len(found) < FEWEST:
+    if len(found) < k.GROUP_DRIVES:
         return []
     places = sorted({place for _, _, s in found for place in s})
     table = np.array([[s.get(place, 0.0) for place in places] for _, _, s in found])
-    labels = fcluster(linkage(table, "average", metric="cosine"), APART, "distance")
+    labels = fcluster(linkage(table, "average", metric="cosine"), k.GROUP_APART, "distance")
     rest = [(row, w) for row, w in zip(rows, weighed, strict=True) if not signature(w)]
     faint, out = [(row, w, s) for row, w in rest if (s := signature(w, FAINT))], []
     for label in np.unique(labels):
         mine = [found[n] for n in np.flatnonzero(labels == label)]
-        if len({row["serial"] for row, _, _ in mine}) < FEWEST:
+        if len({row["serial"] for row, _, _ in mine}) < k.GROUP_DRIVES:
             continue
         mine += _joining(faint, mine)
         serials, recordings = (tuple(sorted({row[key] for row, _, _ in mine})) for key in ("serial", "recording"))
@@ -95,7 +93,7 @@ def _joining(faint, mine) -> list:
     companions, places = set(_companions(mine)), {place for _, _, s in mine for place in s}
     mean = {place: np.mean([s.get(place, 0.0) for _, _, s in mine]) for place in places}
     length = np.sqrt(sum(v**2 for v in mean.values()))
-    alike = lambda s: sum(v * mean.get(place, 0.0) for place, v in s.items()) >= (1.0 - APART) * length  # noqa: E731
+    alike = lambda s: sum(v * mean.get(place, 0.0) for place, v in s.items()) >= (1.0 - k.GROUP_APART) * length  # noqa: E731
     present = lambda w: {e for e, p in w.present.items() if p > 0.5}  # noqa: E731
     return [(row, w, s) for row, w, s in faint if present(w) and present(w) <= companions and alike(s)]
 

@@ -2,10 +2,11 @@
 """Drives that differ from the rest of their fleet, and why.
 
 Two questions are asked of every drive.  Is a parameter outside of what the other drives predict (population.py)?  Of
-all these tests the Benjamini-Hochberg procedure keeps the share of false ones below FALSE.  Does it have an effect that
-few drives have?  The fleet's posterior (rates.py) says so with the probability of being wrong, and effects are told as
-long as the mean of these probabilities is below FALSE.  Where an effect and its companions leave more than half of what
-there is beside the spread of manufacture, something unknown is at work, which they may imitate: they are not told.
+all these tests the Benjamini-Hochberg procedure keeps the share of false ones below FLEET_FALSE.  Does it have an
+effect that few drives have?  The fleet's posterior (rates.py) says so with the probability of being wrong, and effects
+are told as long as the mean of these probabilities is below FLEET_FALSE.  Where an effect and its companions leave more
+than half of what there is beside the spread of manufacture, something unknown is at work, which they may imitate: they
+are not told.
 """
 
 from __future__ import annotations
@@ -18,10 +19,6 @@ from scipy import stats
 from fluxproof.diagnosis.fleet.hypotheses import BASE
 from fluxproof.diagnosis.fleet.rates import Weighed
 from fluxproof.diagnosis.ground import constants as k
-
-FALSE = 0.05  # share of the reported findings that may be false
-COMMON = 0.2  # share of the fleet from which an effect is a property of the design: then its size is compared
-LEAST_DRIVES = 8  # fewer tell no outlier from a spread
 
 
 @dataclass(frozen=True)
@@ -62,12 +59,12 @@ def explains(weighed: Weighed | None) -> bool:
 
 def common(effect, rates) -> bool:
     """Whether an effect belongs to every drive of the design."""
-    return effect in BASE or rates.get(effect, 0.0) >= COMMON
+    return effect in BASE or rates.get(effect, 0.0) >= k.COMMON
 
 
 def _sizes(populations, rates) -> list[Finding]:
     tests = [
-        (pop, n) for pop in populations if common(pop.effect, rates) and len(pop.x) >= LEAST_DRIVES
+        (pop, n) for pop in populations if common(pop.effect, rates) and len(pop.x) >= k.OUTLIER_DRIVES
         for n in range(len(pop.x))
     ]  # fmt: skip
     if not tests:
@@ -76,12 +73,12 @@ def _sizes(populations, rates) -> list[Finding]:
     return [
         Finding(pop.serials[n], pop.effect, pop.parameter, float(pop.x[n]), float(pop.s[n]), pop.unit, pop.mean,
                 pop.spread, float(pop.z[n]), float(q))
-        for (pop, n), q in zip(tests, adjusted, strict=True) if q <= FALSE
+        for (pop, n), q in zip(tests, adjusted, strict=True) if q <= k.FLEET_FALSE
     ]  # fmt: skip
 
 
 def _presences(present, values, rates) -> list[Finding]:
-    if len(present) < LEAST_DRIVES:
+    if len(present) < k.OUTLIER_DRIVES:
         return []
     doubts = sorted(
         (1.0 - p, serial, effect)
@@ -89,7 +86,7 @@ def _presences(present, values, rates) -> list[Finding]:
     )  # fmt: skip
     mean = np.cumsum([d for d, _, _ in doubts]) / np.arange(1, len(doubts) + 1)
     out = []
-    for doubt, serial, effect in doubts[: int(np.searchsorted(mean, FALSE, side="right"))]:
+    for doubt, serial, effect in doubts[: int(np.searchsorted(mean, k.FLEET_FALSE, side="right"))]:
         key = next((key for key in values if key[0] == effect and serial in values[key]), None)
         value, sigma, unit = values[key][serial] if key else (float("nan"), float("nan"), "")
         parameter = key[1] if key else ""

@@ -2,10 +2,10 @@
 """Mean, spread and shrunk values of a parameter over the drives of one design.
 
 Drive i has the true value theta_i ~ N(mu, tau^2); its recordings say x_i with the standard deviation s_i.  A drive that
-is faulty is no part of that: with the probability epsilon its x_i comes from a normal WIDE times as wide.  mu, tau and
-epsilon maximise the restricted likelihood of
+is faulty is no part of that: with the probability epsilon its x_i comes from a normal FAULTY_WIDE times as wide.  mu,
+tau and epsilon maximise the restricted likelihood of
 
-    x_i ~ (1 - epsilon) N(mu, v_i) + epsilon N(mu, WIDE^2 v_i),    v_i = tau^2 + s_i^2
+    x_i ~ (1 - epsilon) N(mu, v_i) + epsilon N(mu, FAULTY_WIDE^2 v_i),    v_i = tau^2 + s_i^2
 """
 
 from __future__ import annotations
@@ -15,10 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize, stats
 
-WIDE = 10.0
-LEAST_DRIVES = 3  # drives of a population: with two, spread and mean cannot be separated
-MOST_FAULTY = 0.3  # epsilon: beyond, the faulty ones are a population of their own
-FAULTY_PRIOR = (1.0, 30.0)  # Beta: one drive in thirty
+from fluxproof.diagnosis.ground import constants as k
 
 
 @dataclass(frozen=True)
@@ -60,9 +57,9 @@ def pooled(values, sigmas) -> tuple[float, float]:
 
 
 def population(effect, parameter, unit, serials, x, s) -> Population | None:
-    """The population of values x (n,) with standard deviations s (n,); None for fewer than LEAST_DRIVES drives."""
+    """The population of values x (n,) with standard deviations s (n,); None for fewer than POPULATION_DRIVES drives."""
     x, s = np.asarray(x, float), np.asarray(s, float)
-    if len(x) < LEAST_DRIVES:
+    if len(x) < k.POPULATION_DRIVES:
         return None
     centre = float(np.median(x))
     scatter = stats.median_abs_deviation(x, scale="normal")  # pyright: ignore[reportArgumentType]  # a word of scipy's
@@ -88,18 +85,18 @@ def _fitted(u, e) -> tuple[float, float, float, float]:
     """(mu, tau, epsilon, sigma of tau) of standardised values, by the restricted likelihood."""
 
     def loss(q):
-        mu, tau, epsilon = q[0], abs(q[1]), MOST_FAULTY / (1.0 + np.exp(-q[2]))
+        mu, tau, epsilon = q[0], abs(q[1]), k.MOST_FAULTY / (1.0 + np.exp(-q[2]))
         v = tau**2 + e**2
         inlier = _inlier(u, mu, v, epsilon)
         restricted = -0.5 * np.log(max((inlier / v).sum(), 1e-12))
-        a, b = FAULTY_PRIOR
+        a, b = 1.0, k.ONE_FAULTY_IN  # Beta distribution
         prior = (a - 1.0) * np.log(epsilon) + (b - 1.0) * np.log1p(-epsilon)
         return -(_log_density(u, mu, v, epsilon).sum() + restricted + prior)
 
     starts = ((0.0, t, -2.0) for t in (0.3, 1.0))
     options = dict(method="Nelder-Mead", options=dict(xatol=1e-5, fatol=1e-7, maxiter=4000))
     best = min((optimize.minimize(loss, s, **options) for s in starts), key=lambda found: found.fun)
-    mu, tau, epsilon = float(best.x[0]), abs(float(best.x[1])), float(MOST_FAULTY / (1.0 + np.exp(-best.x[2])))
+    mu, tau, epsilon = float(best.x[0]), abs(float(best.x[1])), float(k.MOST_FAULTY / (1.0 + np.exp(-best.x[2])))
     step = 0.02 * max(tau, float(np.median(e)))
     at = [loss((mu, t, best.x[2])) for t in (max(tau, step) - step, max(tau, step), max(tau, step) + step)]
     curvature = (at[0] - 2.0 * at[1] + at[2]) / step**2
@@ -111,21 +108,22 @@ def _fitted(u, e) -> tuple[float, float, float, float]:
 def _log_density(u, mu, v, epsilon):
     d2 = (u - mu) ** 2 / v
     common = -0.5 * np.log(2.0 * np.pi * v)
-    return common + np.logaddexp(np.log1p(-epsilon) - 0.5 * d2, np.log(epsilon) - np.log(WIDE) - 0.5 * d2 / WIDE**2)
+    outside = np.log(epsilon) - np.log(k.FAULTY_WIDE) - 0.5 * d2 / k.FAULTY_WIDE**2
+    return common + np.logaddexp(np.log1p(-epsilon) - 0.5 * d2, outside)
 
 
 def _inlier(u, mu, v, epsilon):
     """(n,) probability of each value to be of the population."""
     d2 = (u - mu) ** 2 / v
     inside = np.log1p(-epsilon) - 0.5 * d2
-    outside = np.log(epsilon) - np.log(WIDE) - 0.5 * d2 / WIDE**2
+    outside = np.log(epsilon) - np.log(k.FAULTY_WIDE) - 0.5 * d2 / k.FAULTY_WIDE**2
     return np.exp(inside - np.logaddexp(inside, outside))
 
 
 def _shrunk(u, e, mu, tau, mean_var, inlier):
     """(values, variances) of the drives: a mixture of a member of the population and of a faulty one."""
     out = []
-    for variance in (tau**2, WIDE**2 * (tau**2 + e**2) - e**2):
+    for variance in (tau**2, k.FAULTY_WIDE**2 * (tau**2 + e**2) - e**2):
         b = variance / (variance + e**2)
         out.append((mu + b * (u - mu), b * e**2 + (1.0 - b) ** 2 * mean_var))
     (inside, inside_var), (outside, outside_var) = out

@@ -23,7 +23,7 @@ from scipy import stats
 
 from fluxproof.diagnosis.fleet.findings import findings
 from fluxproof.diagnosis.fleet.hypotheses import BASE
-from fluxproof.diagnosis.fleet.population import WIDE, Population
+from fluxproof.diagnosis.fleet.population import Population
 from fluxproof.diagnosis.fleet.rates import log_odds, prior_rate, weighed
 from fluxproof.diagnosis.fleet.row import hypothesis_rows, one_line
 from fluxproof.diagnosis.fleet.schema import COLUMNS
@@ -38,7 +38,6 @@ from golden_model.drive_file import MOST_BYTES
 from golden_model.regular_file import open_regular, read_regular
 
 MOST_ROWS = 1_000_000
-EVEN = 0.5  # the most that a fleet makes of the prior probability of an effect
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,7 @@ class Prior:
     def shifts(self) -> dict[str, float]:
         """{effect: change of its log prior odds}; an effect that the fleet never had becomes rarer."""
         never = prior_rate(0.0, self.recordings)
-        known = {name: min(self.rates.get(name, never), EVEN) for name in self.names()}
+        known = {name: min(self.rates.get(name, never), k.FLEET_EVEN) for name in self.names()}
         return {name: log_odds(rate) - log_odds(k.PRESENT) for name, rate in known.items()}
 
     def names(self) -> list[str]:
@@ -140,7 +139,7 @@ def placed(pop: Population, value: float, sigma: float) -> InFleet:
     within = pop.spread**2 + pop.mean_sigma**2
     weight = within / v
     likely = stats.t.pdf(z, freedom) * (1.0 - pop.faulty)
-    other = stats.norm.pdf(z, scale=WIDE) * pop.faulty
+    other = stats.norm.pdf(z, scale=k.FAULTY_WIDE) * pop.faulty
     member = float(likely / max(likely + other, 1e-300))
     shrunk = member * (pop.mean + weight * (value - pop.mean)) + (1.0 - member) * value
     between = member * (1.0 - member) * ((1.0 - weight) * (value - pop.mean)) ** 2

@@ -18,7 +18,6 @@ import numpy as np
 
 from fluxproof.diagnosis.ground import constants as k
 
-WORTH = 2.0  # recordings that the prior rate counts as
 STEPS, STANDS = 200, 1e-6
 
 
@@ -36,7 +35,7 @@ class Weighed:
 
 def prior_rate(count: float = 0.0, total: float = 0.0) -> float:
     """The rate of an effect of which ``count`` of ``total`` recordings have it."""
-    return (WORTH * k.PRESENT + count) / (WORTH + total)
+    return (k.RATE_WORTH * k.PRESENT + count) / (k.RATE_WORTH + total)
 
 
 def weigh(rows: list[dict]) -> tuple[dict[str, float], list[Weighed | None]]:

@@ -9,9 +9,9 @@ import numpy as np
 
 from fluxproof.diagnosis.fleet.population import pooled
 from fluxproof.diagnosis.fleet.rates import Weighed
+from fluxproof.diagnosis.ground import constants as k
 
 LEAST_SHARE = 1e-3  # of the probability: sets below it move no value
-USELESS = 10.0  # sigma over value, or over the least sigma of a set: not determined by the recording
 
 
 def values_of(weighed: Weighed | None) -> dict[tuple[str, str], tuple[float, float, str]]:
@@ -30,12 +30,12 @@ def values_of(weighed: Weighed | None) -> dict[tuple[str, str], tuple[float, flo
         p, x, s = (np.array(column) for column in list(zip(*entries, strict=True))[:3])
         if p.sum() < 0.5:  # of a set that is not believed
             continue
-        told = s <= USELESS * s.min()  # a set that does not determine the parameter is ignored
+        told = s <= k.USELESS * s.min()  # a set that does not determine the parameter is ignored
         p, x, s = p[told], x[told], s[told]
         p = p / p.sum()
         mean = float(p @ x)
         sigma = float(np.sqrt(p @ (s**2 + (x - mean) ** 2)))
-        if sigma < USELESS * abs(mean):
+        if sigma < k.USELESS * abs(mean):
             out[key] = (mean, sigma, entries[0][3])
     return out
 

@@ -139,3 +139,26 @@ SAME_COLUMN = 0.999
 # Constant misfit, relative to the bus and to the voltage, that may be ripple or resolution; multiple of it within which
 # a single effect explains the constant misfit.
 CONSTANT_DC, CONSTANT_U, FITS = 1e-3, 5e-3, 3.0
+
+# ---- fleets
+# Largest share of false ones among the reported findings, and among the reported rates.
+FLEET_FALSE = 0.05
+# Share of healthy drives in which a drift is reported at some time, however often one looks.
+DRIFT_ALARM = 0.01
+# Confidence of the interval in which a drift reaches its limit.
+DRIFT_CONFIDENCE = 0.95
+# Least number of recordings of a drift: a line through fewer has hardly a scatter to be judged by.
+DRIFT_RECORDINGS = 5
+# Distance, 1 minus the cosine of two signatures, within which remainders are alike; least number of drives of a group.
+GROUP_APART, GROUP_DRIVES = 0.35, 3
+# Share of the fleet from which an effect is a property of the design, so that its size is compared.
+COMMON = 0.2
+# Least number of drives: fewer tell no outlier from a spread; with two, spread and mean cannot be separated.
+OUTLIER_DRIVES, POPULATION_DRIVES = 8, 3
+# Spread of the faulty drives relative to that of the others; largest share of them, as more are a population of their
+# own; one in so many drives is faulty before any is seen.
+FAULTY_WIDE, MOST_FAULTY, ONE_FAULTY_IN = 10.0, 0.3, 30.0
+# Recordings that the prior rate of an effect counts as; the most that a fleet makes of an effect's prior probability.
+RATE_WORTH, FLEET_EVEN = 2.0, 0.5
+# Sigma over value, or over the least sigma of a set, from which a recording does not determine a parameter.
+USELESS = 10.0

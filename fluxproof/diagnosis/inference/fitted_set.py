@@ -5,18 +5,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fluxproof.diagnosis.effects import believable
 from fluxproof.diagnosis.ground import constants as k
 
+if TYPE_CHECKING:
+    from fluxproof.diagnosis.inference.problem import Problem
+
 
 @dataclass(frozen=True, eq=False)
 class FittedSet:
     """What the evidence of a set finds on a problem (inference/problem.py)."""
 
-    problem: object  # Problem
+    problem: Problem
     names: tuple[str, ...]  # sorted
     value: float  # log posterior, not normalised; -inf: an impossible set
     take: np.ndarray  # (k,) int, columns of the problem

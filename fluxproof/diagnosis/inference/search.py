@@ -30,8 +30,9 @@ def search(setup: Setup, progress=lambda text: None) -> Posterior:
 
 def within(posterior: Posterior, allowed: Iterable[str], idle: Iterable[str]) -> Posterior:
     """The posterior over sets of the effects ``allowed``, without those ``idle``."""
-    judged = Judged(posterior.setup, frozenset(allowed))
-    judged.fits = {names: fit for names, fit in posterior.fits.items() if judged.allowed.issuperset(names)}
+    only = frozenset(allowed)
+    judged = Judged(posterior.setup, only)
+    judged.fits = {names: fit for names, fit in posterior.fits.items() if only.issuperset(names)}
     judged.around = set(posterior.around)
     return _refined(judged, posterior.idle | frozenset(idle))
 

@@ -9,7 +9,11 @@ from fluxproof.diagnosis.inference.problem import Problem
 
 
 def neighbours(judged: Judged, best: Names):
-    """Linearise at the best set, and judge it and the sets near it there."""
+    """Linearise at the best set, and judge it and the sets near it there.
+
+    A slow log of an EMRAX 228 whose angle is off by half a radian, with a voltage that is 14 % too large and 8 % more
+    magnet flux: without it a quarter of the probability lies with other sets.
+    """
     problem = around(judged.setup, judged.fits[best])
     if problem is not None:
         judged.judge(problem, [best], own=True)

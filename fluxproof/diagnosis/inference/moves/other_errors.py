@@ -7,7 +7,11 @@ TRIED = 8
 
 
 def other_errors(judged: Judged, best: Names):
-    """Linearise close sets with other measurement errors: on data that are corrected otherwise they look worse."""
+    """Linearise close sets with other measurement errors: on data that are corrected otherwise they look worse.
+
+    A slow log of an EMRAX 228 whose angle is off by half a radian, with a voltage that is 14 % too large and 8 % more
+    magnet flux: without it a sixth of the probability lies with other sets.
+    """
     mine = judged.errors(best)
     for _ in range(TRIED):
         least = judged.best().value - CLOSE
