@@ -95,6 +95,13 @@ def test_an_answer_where_all_agrees(given, expected):
     assert word(given, NO_CAUSE) == expected
 
 
+def test_a_guess_counts_where_a_note_tells_of_one():
+    truth = Truth((WARM,), tells="rpm", guess="assumed")
+    given = answer(effects=[effect()])
+    assert word(given, truth) == "right"
+    assert word(given | {"notes": ["it is assumed"]}, truth) == "wrong"
+
+
 def test_an_improved_drive_that_changes_nothing():
     given = answer(effects=[effect()], advice="Use drive_improved.toml.") | {"improved": "same"}
     assert word(given) == "wrong" and word(given | {"improved": "changed"}) == "right"

@@ -95,6 +95,7 @@ class Mishap:
     limit: str = ""
     never: str = ""
     tells: str = ""
+    guess: str = ""
     may: tuple[str, ...] = ()
     reading: str = ""
     may_read: str = ""
@@ -121,7 +122,7 @@ class Mishap:
                 beside.append(Cause((name,), sizes))
         if self.ignored:
             beside += [Cause((KEYS[key],)) for key in BASES[base].true]
-        return Truth(tuple(causes), tuple(beside), self.readings, self.limit, self.never, self.tells)
+        return Truth(tuple(causes), tuple(beside), self.readings, self.limit, self.never, self.tells, self.guess)
 
 
 def scaled(factor, *names):

@@ -31,7 +31,8 @@ def judge(answer: dict, truth: Truth, machine: dict) -> tuple[str, str]:
     if "refused" in answer or answer["verdict"] == "bad_recording":
         return _refused(answer, truth, headline)
     faults = [*_false_effects(answer, truth, machine), *_false_groups(answer, truth), *_false_readings(answer, truth)]
-    if truth.tells and not _any([truth.tells], answer["sentence"]):
+    guessed = truth.tells and (not truth.guess or _any([truth.guess], " ".join(answer.get("notes", []))))
+    if guessed and not _any([truth.tells], answer["sentence"]):
         faults.append("rests on a guess that the headline does not tell")
     if answer.get("improved") == "same" and CALLS_FOR_IT in answer["advice"]:
         faults.append("drive_improved.toml equals the given drive file")

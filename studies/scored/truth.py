@@ -39,7 +39,8 @@ class Truth:
     readings: regex of conventions and corrections that are right and need not be told.
     limit: regex of a message that names the true reason why this recording cannot be diagnosed.
     never: regex of a headline or advice that is wrong whatever else the answer says.
-    tells: regex that the headline of an answer must match, as time, speed or unit had to be guessed.
+    tells: regex that the sentence of an answer must match, as time, speed or unit had to be guessed.
+    guess: regex of a note without which nothing was guessed after all.
     """
 
     causes: tuple[Cause, ...] = ()
@@ -48,6 +49,7 @@ class Truth:
     limit: str = ""
     never: str = ""
     tells: str = ""
+    guess: str = ""
     text: str = ""
 
     def told(self) -> str:
