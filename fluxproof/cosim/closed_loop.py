@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -108,7 +108,7 @@ class Result:
     state: fluxproof.State | None = None  # the golden model's, at the end
 
 
-def read_out(values: Mapping[str, int]) -> fluxproof.Observed:
+def read_out(values: Mapping[str, Any]) -> fluxproof.Observed:
     """A device's values of a sample in the golden model's type."""
     return fluxproof.Observed(**{name: values[name] for name in fluxproof.Observed._fields})
 
@@ -119,7 +119,7 @@ class Comparison:
     def __init__(self, device: Device, register_set):
         self.device, self.config = device, register_set.config
         self.golden, self.result = GoldenPeriods(register_set), Result()
-        self.samples: list[tuple[int, ...]] = []
+        self.samples: list[tuple[int | str, ...]] = []
         self.observed: list[fluxproof.Observed] = []
         self.edges: list[tuple[int, int, int]] = []
 
