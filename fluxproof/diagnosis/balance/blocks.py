@@ -77,9 +77,10 @@ def _unwrapped(recording, run):
     breaks = np.flatnonzero(np.diff(run)) + 1
     if len(breaks) and recording.has("omega_e"):
         t, omega = recording["t"], recording["omega_e"]
-        for k in breaks:
-            expected = theta[k - 1] + 0.5 * (omega[k] + omega[k - 1]) * (t[k] - t[k - 1])
-            theta[k:] += 2 * np.pi * np.round((expected - theta[k]) / (2 * np.pi))
+        expected = theta[breaks - 1] + 0.5 * (omega[breaks] + omega[breaks - 1]) * (t[breaks] - t[breaks - 1])
+        turns = np.zeros(len(theta))
+        turns[breaks] = np.round((expected - theta[breaks]) / (2 * np.pi))
+        theta += 2 * np.pi * np.cumsum(turns)  # a gap moves all rows behind it
     return theta
 
 
