@@ -7,6 +7,7 @@ Stages run in this order, since each relies on the corrections of the earlier on
 
     values    missing and infinite numbers
     time      order of rows, sampling, gaps
+    gates     rows in which the inverter is off
     units     degrees, percent, milliamps, shaft instead of electrical quantities
     complete  missing columns are derived from others
     geometry  phases, directions, angle against speed
@@ -24,7 +25,7 @@ import pkgutil
 
 import numpy as np
 
-STAGES = ("values", "time", "units", "complete", "geometry", "signals", "extent")
+STAGES = ("values", "time", "gates", "units", "complete", "geometry", "signals", "extent")
 
 
 def checks() -> list:
