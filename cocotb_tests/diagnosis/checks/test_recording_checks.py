@@ -293,7 +293,7 @@ def test_a_dq_log_with_the_speed_of_the_other_direction(tmp_path, nominal):
 def test_one_gap_is_singular(tmp_path, nominal):
     table = {name: np.delete(values, 2000) for name, values in made().items()}
     recording = load_recording(write(tmp_path / "r.csv", table), nominal)
-    assert [p.message for p in recording.problems] == ["1 gap, about 1 sample missing"]
+    assert [p.message for p in recording.problems] == ["1 gap, about 1 row missing"]
 
 
 def test_every_check_has_a_stage():

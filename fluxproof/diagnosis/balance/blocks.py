@@ -226,6 +226,12 @@ def _cut(recording, nominal, run, i_s, omega, block_rows):
             break
     if not len(starts):
         whole = length + 2 * margin
+        longest = int(np.bincount(run).max())
+        if longest < whole:
+            raise RecordingError(
+                f"{recording.source}: at most {longest} rows follow each other without a gap or a row that cannot be "
+                f"used, and {whole} are needed: rows are missing; record without losing rows"
+            )
         raise RecordingError(
             f"{recording.source}: no stretch of {whole} rows ({whole * period * 1e3:.0f} ms) without gap in which "
             "current and speed are steady: record longer operating points"

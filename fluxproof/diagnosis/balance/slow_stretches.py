@@ -32,6 +32,7 @@ FEW_TURNS = 1.5  # the same in a log without messages, whose stretches are short
 TURNS = 4.0  # electrical turns within a stretch: the inverter loss depends on the angle, its mean over turns does not
 RESTED = 6.0  # times the median time between changes: after a longer time the signal counts as constant
 USUAL = 0.9  # quantile of the other intervals
+GAP = 10.0  # times the usual step
 MESSAGE_ROWS = 3.0  # rows; a signal that changes as often has no messages
 PARTS = 4  # of a stretch without messages
 NOISE = 3.0  # standard deviations: usual range of PARTS means
@@ -245,5 +246,7 @@ def restless(t, x) -> bool:
 
 def _between_changes(t, x) -> np.ndarray:
     bends = np.flatnonzero(np.abs(np.diff(x, 2)) > 1e-9 * max(np.nanmax(np.abs(x)), 1e-30)) + 1
-    apart = np.diff(t[bends])
-    return apart[apart > 1.5 * np.median(np.diff(t))]
+    step = np.median(np.diff(t))
+    over = np.append(0, np.cumsum(np.diff(t) > GAP * step))
+    apart = np.diff(t[bends])[np.diff(over[bends]) == 0]  # rows that were not recorded are no wait for a message
+    return apart[apart > 1.5 * step]
