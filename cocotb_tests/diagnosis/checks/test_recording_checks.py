@@ -261,7 +261,7 @@ FATAL = {
         "sample_time",
     ),
     "no current": (lambda x: edit(x, i_a=np.full(4000, np.nan), i_b=np.full(4000, np.nan)), "missing"),
-    "angle stands": (lambda x: edit(x, theta_e=np.ones(4000)), "angle_speed"),
+    "angle stands": (lambda x: edit(x, theta_e=np.ones(4000)), "stuck"),
     "time stands": (lambda x: edit(x, t=np.zeros(4000)), "time_order"),
     "huge currents": (lambda x: edit(x, **{n: x[n] * 1e5 for n in ("i_a", "i_b", "i_c")}), "unit"),
     "duties in counts": (
