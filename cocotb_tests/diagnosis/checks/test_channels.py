@@ -152,3 +152,21 @@ def test_no_angle_shows_no_harmonics(tmp_path, nominal):
     assert "harmonics" in recording.lacks and recording.meta["angle"] == "integrated"
     check_recording(recording, nominal)
     assert codes(recording) == []
+
+
+def test_single_lost_rows_are_filled_where_no_stretch_is_whole(tmp_path, nominal):
+    table = made(noise=0.0)
+    lost = np.flatnonzero(np.random.default_rng(6).random(3998) < 0.06) + 1
+    recording = load(tmp_path, nominal, {n: np.delete(v, lost) for n, v in table.items()})
+    assert codes(recording) == ["gap", "lost_rows"] and len(recording) > 3990
+    rows = np.round(recording["t"] / T).astype(int)
+    assert recording.joined[:-1].sum() >= len(recording) - 20 and np.array_equal(rows, np.unique(rows))
+    settled = slice(100, 900)
+    for name in ("i_a", "d_b", "theta_e"):
+        off = np.abs(recording[name][settled] - table[name][rows[settled]])
+        assert np.percentile(off, 98) < 0.01 * np.ptp(table[name])
+
+
+def test_a_few_lost_rows_are_left_as_gaps(tmp_path, nominal):
+    recording = load(tmp_path, nominal, {n: np.delete(v, [700, 1500, 3000]) for n, v in made().items()})
+    assert codes(recording) == ["gap"] and len(recording) == 3997

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Angles in degrees, turns or codes, angles and speeds of the shaft, speeds in rpm: recognised by the fit and converted.
+"""Angles in degrees, turns or codes, angles and speeds of the shaft, speeds in rpm: recognised by the fit, converted.
 
 Each unit of the angle is tested with the nominal stator balance; each unit of the speed with the advance of the angle,
 or without an angle with the steady dq balance.  A unit is accepted only if the unchanged columns do not fit and it
