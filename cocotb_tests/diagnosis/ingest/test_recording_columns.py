@@ -234,3 +234,11 @@ def test_missing_columns_are_derived_and_noted(tmp_path, nominal):
     np.testing.assert_allclose(recording["t"], table["t"], atol=1e-12)
     np.testing.assert_allclose(recording["omega_e"][50:-50], table["omega_e"][50:-50], rtol=2e-3)
     np.testing.assert_allclose(recording["i_b"], table["i_b"], atol=0.05)
+
+
+def test_numbered_columns_are_proposed_under_their_usual_names(tmp_path, nominal):
+    table = {"t": np.arange(50) * 1e-4} | dict.fromkeys(("id1", "iq1", "vd1", "vq1", "omega"), np.ones(50))
+    with pytest.raises(RecordingError) as refused:
+        load_recording(write(tmp_path / "r.csv", table), nominal)
+    for proposal in ("'id1' for i_d", "'vd1' for u_d_ref", "'vq1' for u_q_ref", "'omega' for omega_e with its unit"):
+        assert proposal in str(refused.value)

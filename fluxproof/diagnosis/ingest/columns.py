@@ -36,6 +36,8 @@ from fluxproof.diagnosis.ingest.units import COMMANDED, OF_BUS, conversion, know
 from fluxproof.diagnosis.ingest.usual_names import usual
 from fluxproof.diagnosis.readers.table import Table, shown
 
+MOST_GUESSES = 6
+UNIT_OF = {"omega_e": " with its unit (rpm, rad/s mech or rad/s of the electrical angle)"}
 WORTH_NAMING = ("torque", "temp_winding", "omega_e", "u_dc")  # which a diagnosis does without if they are not found
 
 
@@ -267,5 +269,20 @@ def _guesses(missing, names) -> str:
     wanted = [w for w in COLUMNS if any(w in re.findall(r"\w+", text) for text in missing)]
     simple = {name.lower().replace("_", ""): name for name in names if split_unit(name)[0] not in COLUMNS}
     close = {w: difflib.get_close_matches(w.replace("_", ""), list(simple), n=1, cutoff=0.6) for w in wanted}
-    pairs = [f"{shown(simple[match[0]], 24)!r} for {w}" for w, match in close.items() if match][:3]
-    return f"; perhaps {', '.join(pairs)}" if pairs else ""
+    likely = {w: simple[match[0]] for w, match in close.items() if match}
+    numbered = _numbered(names)
+    if found := {w: numbered[w] for w in wanted if w in numbered}:
+        likely = found | {w: column for w, column in likely.items() if column not in found.values() and w == "omega_e"}
+    pairs = [f"{shown(column, 24)!r} for {w}{UNIT_OF.get(w, '')}" for w, column in likely.items()]
+    return f"; perhaps {', '.join(pairs[: MOST_GUESSES if found else 3])}" if pairs else ""
+
+
+def _numbered(names) -> dict[str, str]:
+    """{canonical name: column} of usual names with the number of a motor or module behind them, such as "vd1"."""
+    out: dict[str, str] = {}
+    for name in names:
+        found = re.fullmatch(r"(.*[^\d_])_?\d", split_unit(name)[0])
+        known = usual(found.group(1), "") if found else None
+        if known:
+            out.setdefault(known[0], name)
+    return out
