@@ -240,11 +240,16 @@ def test_numbered_columns_are_proposed_under_their_usual_names(tmp_path, nominal
     table = {"t": np.arange(50) * 1e-4} | dict.fromkeys(("id1", "iq1", "vd1", "vq1", "omega"), np.ones(50))
     with pytest.raises(RecordingError) as refused:
         load_recording(write(tmp_path / "r.csv", table), nominal)
-    for proposal in ("'id1' for i_d", "'vd1' for u_d_ref", "'vq1' for u_q_ref", "'omega' for omega_e with its unit"):
+    for proposal in (
+        "'id1' for i_d",
+        "'vd1' for u_d_ref",
+        "'vq1' for u_q_ref",
+        "'omega' for omega_e if its unit is stated",
+    ):
         assert proposal in str(refused.value)
 
 
 def test_a_speed_without_a_unit_is_proposed_with_one(tmp_path, nominal):
     table = {name: np.ones(50) for name in ("i_d", "i_q", "u_d_ref", "u_q_ref", "n")}
-    with pytest.raises(RecordingError, match="'n' for omega_e with its unit"):
+    with pytest.raises(RecordingError, match="'n' for omega_e if its unit is stated"):
         load_recording(write(tmp_path / "r.csv", table), nominal)

@@ -37,7 +37,6 @@ from fluxproof.diagnosis.ingest.usual_names import TOLD, usual
 from fluxproof.diagnosis.readers.table import Table, shown
 
 MOST_GUESSES = 6
-UNIT_OF = {"omega_e": " with its unit (rpm, rad/s mech or rad/s of the electrical angle)"}
 WORTH_NAMING = ("torque", "temp_winding", "omega_e", "u_dc")  # which a diagnosis does without if they are not found
 
 
@@ -273,7 +272,7 @@ def _guesses(missing, names) -> str:
     nearly = _nearly_usual(names)
     if found := {w: nearly[w] for w in wanted if w in nearly}:
         likely = found | {w: column for w, column in likely.items() if column not in found.values() and w == "omega_e"}
-    pairs = [f"{shown(column, 24)!r} for {w}{UNIT_OF.get(w, '')}" for w, column in likely.items()]
+    pairs = [f"{shown(column, 24)!r} for {w}{_with_unit(w)}" for w, column in likely.items()]
     return f"; perhaps {', '.join(pairs[: MOST_GUESSES if found else 3])}" if pairs else ""
 
 
@@ -289,3 +288,8 @@ def _nearly_usual(names) -> dict[str, str]:
         if known:
             out.setdefault(known[0], name)
     return out
+
+
+def _with_unit(name) -> str:
+    """What a proposal for a column must say of its unit: an undocumented speed may be of the shaft, or in rpm."""
+    return f" if its unit is stated, {{name = {name!r}, unit = 'rpm'}} or 'rad/s'" if name == "omega_e" else ""
