@@ -9,7 +9,7 @@ import pytest
 from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.recordings.from_core import POINT, columns
 from fluxproof.diagnosis.balance.blocks import view_of
-from fluxproof.diagnosis.balance.settling import MOST_DROPPED, settled, swings
+from fluxproof.diagnosis.balance.settling import MOST_DROPPED, ringing, settled, swings
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import from_columns
 
@@ -51,3 +51,18 @@ def test_a_recording_that_never_settles_is_kept():
     assert len(settled(restless)) == len(view) - MOST_DROPPED
     few = restless.take(np.arange(6))
     assert len(settled(few)) == len(few)
+
+
+def test_only_the_first_blocks_ring():
+    spread = np.ones(40)
+    assert ringing(spread) == 0
+    assert ringing(np.where(np.arange(40) < 2, 9.0, spread)) == 2
+    assert ringing(np.where(np.isin(np.arange(40), (0, 1, 20)), 9.0, spread)) == 0
+    assert ringing(np.where(np.arange(40) < 10, 9.0, spread)) == 0
+
+
+def test_blocks_of_a_short_dwell_that_ring_are_excluded():
+    view = started(0.0).take(np.arange(20))
+    ring = 30.0 * np.cos(2 * np.pi / 20.0 * np.arange(view.u.shape[1]))
+    swung = view.replace(u=view.u + ring * (np.arange(20) < 2)[:, None], run=np.arange(20) // 4)
+    assert np.array_equal(settled(swung).rows, view.rows[2:])

@@ -261,7 +261,7 @@ FATAL = {
         "sample_time",
     ),
     "no current": (lambda x: edit(x, i_a=np.full(4000, np.nan), i_b=np.full(4000, np.nan)), "missing"),
-    "angle stands": (lambda x: edit(x, theta_e=np.ones(4000)), "angle_speed"),
+    "angle stands": (lambda x: edit(x, theta_e=np.ones(4000)), "stuck"),
     "time stands": (lambda x: edit(x, t=np.zeros(4000)), "time_order"),
     "huge currents": (lambda x: edit(x, **{n: x[n] * 1e5 for n in ("i_a", "i_b", "i_c")}), "unit"),
     "duties in counts": (
@@ -293,7 +293,7 @@ def test_a_dq_log_with_the_speed_of_the_other_direction(tmp_path, nominal):
 def test_one_gap_is_singular(tmp_path, nominal):
     table = {name: np.delete(values, 2000) for name, values in made().items()}
     recording = load_recording(write(tmp_path / "r.csv", table), nominal)
-    assert [p.message for p in recording.problems] == ["1 gap, about 1 sample missing"]
+    assert [p.message for p in recording.problems] == ["1 gap, about 1 row missing"]
 
 
 def test_every_check_has_a_stage():

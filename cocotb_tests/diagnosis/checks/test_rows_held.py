@@ -25,7 +25,7 @@ def test_rows_that_a_logger_holds_are_read_once(tmp_path, nominal):
     path = write(tmp_path / "r.parquet", held(table, np.arange(4000) // 2 * 2))
     recording = load_recording(path, nominal)
     assert codes(recording) == ["repeated", "slow_sampling"] and len(recording) == 2000
-    assert "written 2 times" in recording.problems[0].message and "sample_time_s" in recording.problems[0].action
+    assert "repeated: 2 equal" in recording.problems[0].message and "sample_time_s" in recording.problems[0].action
     np.testing.assert_allclose(np.diff(recording["t"]), 2 * T)
     np.testing.assert_array_equal(recording["i_a"], table["i_a"][::2])
 

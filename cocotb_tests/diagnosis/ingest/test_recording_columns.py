@@ -227,10 +227,29 @@ def test_missing_columns_are_derived_and_noted(tmp_path, nominal):
     table = made()
     lean = {name: v for name, v in table.items() if name not in ("t", "omega_e", "u_dc", "i_b")}
     recording = load_recording(write(tmp_path / "r.csv", lean), nominal)
-    assert codes(recording) == []
+    assert codes(recording) == ["assumed_time"]  # no speed confirms it
     notes = " ".join(recording.meta["notes"])
     for word in ("no time column", "omega_e is not recorded", "u_dc is not recorded", "i_b is not recorded"):
         assert word in notes
     np.testing.assert_allclose(recording["t"], table["t"], atol=1e-12)
     np.testing.assert_allclose(recording["omega_e"][50:-50], table["omega_e"][50:-50], rtol=2e-3)
     np.testing.assert_allclose(recording["i_b"], table["i_b"], atol=0.05)
+
+
+def test_numbered_columns_are_proposed_under_their_usual_names(tmp_path, nominal):
+    table = {"t": np.arange(50) * 1e-4} | dict.fromkeys(("id1", "iq1", "vd1", "vq1", "omega"), np.ones(50))
+    with pytest.raises(RecordingError) as refused:
+        load_recording(write(tmp_path / "r.csv", table), nominal)
+    for proposal in (
+        "'id1' for i_d",
+        "'vd1' for u_d_ref",
+        "'vq1' for u_q_ref",
+        "'omega' for omega_e if its unit is stated",
+    ):
+        assert proposal in str(refused.value)
+
+
+def test_a_speed_without_a_unit_is_proposed_with_one(tmp_path, nominal):
+    table = {name: np.ones(50) for name in ("i_d", "i_q", "u_d_ref", "u_q_ref", "n")}
+    with pytest.raises(RecordingError, match="'n' for omega_e if its unit is stated"):
+        load_recording(write(tmp_path / "r.csv", table), nominal)

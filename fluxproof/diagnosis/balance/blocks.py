@@ -28,6 +28,7 @@ RAMP_TORQUE = 0.02  # of rated torque: a larger change of inertial torque within
 CURRENT_STEP = 0.08  # of rated current: a larger change within a block means a transient
 RIPPLE = 0.05  # of rated current, rms around the block's parabola
 SPEED_STEP = 0.06  # of the largest speed
+LATE_SPEED_STEP = 0.003  # the same where the angle is integrated from the speed: a recorded speed is filtered and late
 SLOW_SHARE = 0.01  # of the speed at which the EMF reaches the bus voltage: tolerance at standstill
 RESTLESS = 3.0  # factor on the tolerances if no block is steady
 EXACT = 1e-6  # of rated current: rounding of numbers in a computer
@@ -220,13 +221,21 @@ def _cut(recording, nominal, run, i_s, omega, block_rows):
     slow = SLOW_SHARE * nominal.inverter.dc_bus_v / flux_level(machine)
     top = max(float(np.nanmax(np.abs(omega), initial=0.0)), slow)
     scale = (machine.rated_current_a, top)
-    tries = [(block_rows, 1.0), *((n, 1.0) for n in SHORTER if n < block_rows), (min(SHORTER), RESTLESS)]
-    for length, patience in tries:
-        starts = _steady_starts(run, i_s, omega, scale, length, margin, patience)
+    lengths = [block_rows, *(n for n in SHORTER if n < block_rows)]
+    steps = [SPEED_STEP] if recording.meta.get("angle") != "integrated" else [LATE_SPEED_STEP, SPEED_STEP]
+    tries = [(n, 1.0, step) for step in steps for n in lengths]
+    for length, patience, step in [*tries, (min(SHORTER), RESTLESS, SPEED_STEP)]:
+        starts = _steady_starts(run, i_s, omega, scale, length, margin, patience, step)
         if len(starts) >= LEAST_BLOCKS:
             break
     if not len(starts):
         whole = length + 2 * margin
+        longest = int(np.bincount(run).max())
+        if longest < whole:
+            raise RecordingError(
+                f"{recording.source}: at most {longest} rows follow each other without a gap or a row that cannot be "
+                f"used, and {whole} are needed: rows are missing; record without losing rows"
+            )
         raise RecordingError(
             f"{recording.source}: no stretch of {whole} rows ({whole * period * 1e3:.0f} ms) without gap in which "
             "current and speed are steady: record longer operating points"
@@ -238,7 +247,7 @@ def _cut(recording, nominal, run, i_s, omega, block_rows):
     return starts, dwell, length
 
 
-def _steady_starts(run, i, omega, scale, block_rows, margin, patience):
+def _steady_starts(run, i, omega, scale, block_rows, margin, patience, speed_step):
     """First rows of the blocks within a run in which current and speed are steady, apart from ripple."""
     n, length = len(run), block_rows + 2 * margin
     rated, top = scale
@@ -256,7 +265,7 @@ def _steady_starts(run, i, omega, scale, block_rows, margin, patience):
             np.ptp(trend.real) < patience * CURRENT_STEP * rated
             and np.ptp(trend.imag) < patience * CURRENT_STEP * rated
             and ripple < patience * RIPPLE * rated
-            and np.ptp(w) < patience * SPEED_STEP * top
+            and np.ptp(w) < patience * speed_step * top
         ):
             starts.append(at + margin)
             at += block_rows

@@ -71,6 +71,7 @@ class Projector:
         part = [np.tile([0, 1], b * h)]
         span = np.abs(view.theta[:, -1] - view.theta[:, 0])
         seen = np.abs(self.orders)[None, :] * span[:, None] >= 2 * np.pi * LEAST_TURNS
+        seen &= view.locked[:, None]
         seen[:, 0] = True
         # Two orders closer than a turn within the block are one functional and must not count twice.
         kept = self._apart(span)

@@ -13,17 +13,31 @@ from fluxproof.diagnosis.balance.misfit import misfit
 
 LEAST_BLOCKS = 8  # of the first dwell: fewer do not determine the scatter
 MOST_DROPPED = 3
+RINGS = 4.0  # times the usual standard deviation
+RINGING = 0.1  # largest share of the blocks
 FAR = 8.0  # standard deviations
 
 
 def settled(view):
     """The view without first blocks whose misfit is far from the line through the following blocks."""
     first = view.run == view.run[0]
-    level = misfit(view)["u"].mean(axis=1)[first]
-    start = 0
+    u = misfit(view)["u"]
+    start = ringing(np.std(u, axis=1))
+    level = u.mean(axis=1)[first]
     while start < MOST_DROPPED and len(level) - start >= LEAST_BLOCKS and swings(level[start:]):
         start += 1
     return view.take(np.arange(start, len(view))) if start else view
+
+
+def ringing(spread) -> int:
+    """Number of first blocks, of (b,) standard deviations of their rows' misfit, that ring as no later block does.
+
+    Currents that ring at power-up have no voltage of the control, and a mean that does not show it.
+    """
+    usual = np.median(spread)
+    rings = np.append(spread > RINGS * usual, False)
+    lasts = int(np.argmin(rings))
+    return lasts if lasts <= RINGING * len(spread) and rings.sum() == lasts else 0
 
 
 def swings(level) -> bool:

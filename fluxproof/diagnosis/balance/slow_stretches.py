@@ -32,6 +32,8 @@ FEW_TURNS = 1.5  # the same in a log without messages, whose stretches are short
 TURNS = 4.0  # electrical turns within a stretch: the inverter loss depends on the angle, its mean over turns does not
 RESTED = 6.0  # times the median time between changes: after a longer time the signal counts as constant
 USUAL = 0.9  # quantile of the other intervals
+CONTROL = 2e-3  # s: a control samples as often
+GAP = 10.0  # times the usual step
 MESSAGE_ROWS = 3.0  # rows; a signal that changes as often has no messages
 PARTS = 4  # of a stretch without messages
 NOISE = 3.0  # standard deviations: usual range of PARTS means
@@ -148,6 +150,7 @@ def stretches_of(recording, nominal, least_s) -> Stretches:
         raise RecordingError(
             f"{r.source}: in no stretch of {window:.2g} s{why} are current, speed and voltage steady"
             f"{_unmet(omega, angle, window, turns)}: record longer operating points, or log faster"
+            f"{_unstated(nominal, t)}"
         )
     mean = lambda x: np.array([np.mean(x[a:b]) for a, b, _ in found])  # noqa: E731
     temp = r["temp_winding"] if r.has("temp_winding") else np.full(len(t), np.nan)
@@ -157,6 +160,14 @@ def stretches_of(recording, nominal, least_s) -> Stretches:
     return Stretches(
         mean(i), mean(u), speed, mean(u_dc), mean(temp), mean(t), first, end, unsteady, rest, float(window), both_axes
     )
+
+
+def _unstated(nominal, t) -> str:
+    """What the drive file leaves open about a log that may be one of the control; "" for others."""
+    step = float(np.median(np.diff(t)))
+    if nominal.control.sample_time_s is not None or step > CONTROL:
+        return ""
+    return f"; if the control samples every {step:.6g} s, state it as [control] sample_time_s"
 
 
 def _unmet(omega, angle, window, turns) -> str:
@@ -245,5 +256,7 @@ def restless(t, x) -> bool:
 
 def _between_changes(t, x) -> np.ndarray:
     bends = np.flatnonzero(np.abs(np.diff(x, 2)) > 1e-9 * max(np.nanmax(np.abs(x)), 1e-30)) + 1
-    apart = np.diff(t[bends])
-    return apart[apart > 1.5 * np.median(np.diff(t))]
+    step = np.median(np.diff(t))
+    over = np.append(0, np.cumsum(np.diff(t) > GAP * step))
+    apart = np.diff(t[bends])[np.diff(over[bends]) == 0]  # rows that were not recorded are no wait for a message
+    return apart[apart > 1.5 * step]

@@ -91,6 +91,12 @@ class View:
             return np.ones(len(self), bool)
         return np.array([not lacking & set(effect.needs) for lacking in self.lacks])
 
+    @property
+    def locked(self) -> np.ndarray:
+        """(b,) bool: blocks whose angle was recorded, so that harmonics of the rotor's turn can be seen."""
+        lacks = self.lacks if self.lacks is not None else [()] * len(self)
+        return np.array(["harmonics" not in lacking for lacking in lacks], bool)
+
     def kept_where(self, blocks, changed):
         """``changed``, a view of the same blocks, with the data of this view in ``blocks`` (b,) bool."""
         if not blocks.any():

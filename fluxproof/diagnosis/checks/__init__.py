@@ -7,10 +7,12 @@ Stages run in this order, since each relies on the corrections of the earlier on
 
     values    missing and infinite numbers
     time      order of rows, sampling, gaps
+    gates     rows in which the inverter is off
     units     degrees, percent, milliamps, shaft instead of electrical quantities
     complete  missing columns are derived from others
+    channels  clipped and stuck ones, impossible values
     geometry  phases, directions, angle against speed
-    signals   clipped, stuck, repeated, sums
+    signals   repeated, sums
     extent    whether enough rows remain
 
 Effects that the diagnosis identifies are no findings: sensor offsets and gains, encoder offset, dead time, noise.
@@ -24,7 +26,7 @@ import pkgutil
 
 import numpy as np
 
-STAGES = ("values", "time", "units", "complete", "geometry", "signals", "extent")
+STAGES = ("values", "time", "gates", "units", "complete", "channels", "geometry", "signals", "extent")
 
 
 def checks() -> list:

@@ -12,7 +12,7 @@ import numpy as np
 from fluxproof.diagnosis.checks.runs import mark, quantum, runs_of_equal
 from fluxproof.diagnosis.ground.recording import Problem
 
-STAGE = "signals"
+STAGE = "channels"
 LEAST_CLIPPED = 3  # rows
 CODES = 12.0
 SHARE = 0.03  # of the channel's range

@@ -36,10 +36,11 @@ def check(recording, nominal) -> None:
         columns["omega_e"] = speed_of(recording)
         notes.append(f"omega_e is not recorded and is computed from theta_e over {SPEED_ROWS} rows")
     if "theta_e" not in columns and "omega_e" in columns and not recording.points:
-        step = np.diff(recording["t"], prepend=recording["t"][0])
-        columns["theta_e"] = wrapped(np.cumsum(columns["omega_e"] * step))
+        step, omega = np.diff(recording["t"]), columns["omega_e"]
+        columns["theta_e"] = wrapped(np.cumsum(np.append(0.0, 0.5 * (omega[1:] + omega[:-1]) * step)))
         notes.append("theta_e is not recorded and is integrated from omega_e: its zero is arbitrary")
         recording.meta["angle"] = "integrated"
+        recording.lacks |= {"harmonics"}  # the integral drifts against the rotor
 
 
 def _drop_dead(recording, name, rated) -> None:

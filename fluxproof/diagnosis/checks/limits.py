@@ -7,7 +7,7 @@ import numpy as np
 
 from fluxproof.diagnosis.ground.recording import Problem
 
-STAGE = "signals"
+STAGE = "channels"
 ROUNDING = 0.005  # tolerance for the rounding of 12-bit duties
 FAR = 2.0  # largest factor, up or down, from the nominal bus voltage
 
@@ -31,7 +31,7 @@ def check(recording, nominal) -> None:
             f"bus voltages are implausible for dc_bus_v = {bus:g} V",
             "rows not used",
         )
-        middle = float(np.median(u_dc))
+        middle = float(np.median(u_dc[recording.usable])) if recording.usable.any() else float(np.median(u_dc))
         if not bus / FAR <= middle <= bus * FAR:
             message = f"the median of u_dc is {middle:.4g} V, but dc_bus_v = {bus:g} V"
             recording.problems.append(

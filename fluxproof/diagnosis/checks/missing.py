@@ -12,8 +12,8 @@ from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "values"
 ABSURD = 1e9  # larger values are due to an overflow or a wrong format
-SLOW = ("temp_winding", "torque", "u_dc", "i_d_ref", "i_q_ref", "u_d_ref", "u_q_ref")
-OPTIONAL = ("temp_winding", "torque", "i_d_ref", "i_q_ref")
+SLOW = ("temp_winding", "torque", "u_dc", "i_d_ref", "i_q_ref", "u_d_ref", "u_q_ref", "fault", "enable")
+OPTIONAL = ("temp_winding", "torque", "i_d_ref", "i_q_ref", "fault", "enable")
 PHASES = ("i_a", "i_b", "i_c")
 MOST_MISSING = 0.5  # largest missing share of a required column
 

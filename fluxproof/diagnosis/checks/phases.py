@@ -14,12 +14,13 @@ import numpy as np
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
 from fluxproof.diagnosis.checks.balance import BETTER, FIT, Rows, SteadyRows, discriminates, misfit, rows_of
 from fluxproof.diagnosis.checks.rival_readings import CLEAR, best_reading, misfit_of
-from fluxproof.diagnosis.ground.arrays import Complex
+from fluxproof.diagnosis.ground.arrays import Complex, Real
 from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "geometry"
 SMALL = 0.03  # of the voltage: a smaller misfit is indistinguishable from noise
 NOTHING = 0.8  # of the voltage: larger than any effect
+EXACT = 1e-9  # of the currents: of their sum where one of them is computed from the other two
 D_CURRENT = 0.08  # of rated current: less does not tell the signs of single axes
 
 ORDERS = {
@@ -81,10 +82,18 @@ def _changes(rows: Rows) -> dict[tuple, Rows]:
         changes["duties", name] = rows.change(d=rows.d[..., order])
         if name != "b and c":
             changes["both", name] = rows.change(i=rows.i[..., order], d=rows.d[..., order])
-    for phase in range(3):
-        sign = np.where(np.arange(3) == phase, -1.0, 1.0)
-        changes["sign", CURRENTS[phase]] = rows.change(i=rows.i * sign)
+    derived = bool(np.max(np.abs(rows.i.sum(axis=-1))) < EXACT * np.max(np.abs(rows.i)))
+    for phase in range(2 if derived else 3):
+        changes["sign", CURRENTS[phase]] = rows.change(i=_negated(rows.i, phase, derived))
     return changes
+
+
+def _negated(i, phase, derived) -> Real:
+    """Phase currents (..., 3) with one of the opposite sign; derived: the third is computed from the other two."""
+    i = i * np.where(np.arange(3) == phase, -1.0, 1.0)
+    if derived:
+        i[..., 2] = -i[..., 0] - i[..., 1]
+    return i
 
 
 def _dq_changes(rows: SteadyRows) -> dict[tuple, Rows]:
@@ -157,9 +166,13 @@ def _apply(recording, change, period) -> None:
             if recording.has(a, b):
                 columns[a], columns[b] = columns[b], columns[a]
     elif what == "sign":
+        third = columns.get("i_c") if which in CURRENTS[:2] else None
+        derived = third is not None and np.allclose(columns["i_a"] + columns["i_b"], -third, 0.0, EXACT * np.ptp(third))
         for name in (*CURRENTS, "i_d", "i_q") if which == "i" else _with_references(which):
             if name in columns:
                 columns[name] = -columns[name]
+        if derived:
+            columns["i_c"] = -columns["i_a"] - columns["i_b"]
     else:
         if "i_c" not in columns and what != "duties":
             columns["i_c"] = -columns["i_a"] - columns["i_b"]

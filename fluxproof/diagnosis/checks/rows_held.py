@@ -35,7 +35,7 @@ def check(recording, nominal) -> None:
     step = float(np.median(np.diff(recording["t"])))
     keep_rows(recording, np.flatnonzero(since % times == 0))
     recording.joined[:-1] = True
-    message = f"every row is written {times} times: the log is faster than its signals"
+    message = f"every row is repeated: {times} equal ones follow each other, as the log is faster than its signals"
     action = "one of each is used"
     ratio = angle_speed_ratio(recording, step)
     if ratio is not None and abs(ratio - 1.0) < CLOSE:  # the angle moves on as if only the others had not been written

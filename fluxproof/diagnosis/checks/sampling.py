@@ -93,7 +93,7 @@ def _join(recording, step, usual) -> None:
         return
     if len(gaps):
         lost = int(np.sum(np.round(step[gaps] / usual) - 1))
-        message = f"{counted(len(gaps), 'gap')}, about {counted(lost, 'sample')} missing"
+        message = f"{counted(len(gaps), 'gap')}, about {counted(lost, 'row')} missing"
         recording.problems.append(
             Problem("gap", message, "t", int(gaps[0]) + 1, len(gaps),
                     "no balance is made across them")

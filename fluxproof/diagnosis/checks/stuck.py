@@ -3,7 +3,8 @@
 
 A constant value alone is no fault: a supply is constant, and so is every signal of a simulated drive at rest.  A phase
 current is stuck if the angle advances and another current changes; an angle if the speed shows rotation; a speed if
-the rate of the angle changes; a dq current if its reference changes; a duty if the angle advances by a whole turn and
+the rate of the angle changes; a dq current if its reference changes, or if the other one differs from row to row while
+the operating point changes; a duty if the angle advances by a whole turn and
 the other duties change.
 """
 
@@ -11,15 +12,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.checks.agreement import wrapped
+from fluxproof.diagnosis.checks.agreement import angle_speed_ratio, wrapped
 from fluxproof.diagnosis.checks.runs import mark, runs_of_equal
 from fluxproof.diagnosis.ground.recording import Problem
 
-STAGE = "signals"
+STAGE = "channels"
 LEAST_STUCK = 50  # rows
 MOST_RUNS = 2000
 CURRENT = 0.1  # of rated current: what counts as a change
 DUTY = 0.03
+LIVE = 0.5  # share of rows in which a channel that is not stuck differs from the row before
+MOVED = 0.2  # of a channel's largest value: another operating point
+SPEED = ("omega_e",)
 
 
 def check(recording, nominal) -> None:
@@ -27,9 +31,10 @@ def check(recording, nominal) -> None:
         return
     rated = nominal.machine.rated_current_a
     turned, by_angle = _turned(recording, nominal.sample_time_s)
+    ratio = angle_speed_ratio(recording, nominal.sample_time_s) or 1.0  # a speed of another unit is not stuck
     tests = {
         "theta_e": lambda a, b: abs(turned[b] - turned[a]) > 0.5,
-        "omega_e": lambda a, b: _speed_left(recording, by_angle, a, b, nominal.sample_time_s),
+        "omega_e": lambda a, b: _speed_left(recording, by_angle, a, b, nominal.sample_time_s * ratio),
     }
     for name in ("i_a", "i_b", "i_c"):
         others = [c for c in ("i_a", "i_b", "i_c") if c != name and c in recording.columns]
@@ -38,7 +43,9 @@ def check(recording, nominal) -> None:
             and _change(recording, o, a, b) > CURRENT * rated
         )
     for name in ("i_d", "i_q"):
-        tests[name] = lambda a, b, o=[f"{name}_ref"]: _change(recording, o, a, b) > 2 * CURRENT * rated
+        tests[name] = lambda a, b, n=name: (
+            _change(recording, [f"{n}_ref"], a, b) > 2 * CURRENT * rated or _others_live(recording, n, a, b, rated)
+        )
     for name in ("d_a", "d_b", "d_c"):
         others = [c for c in ("d_a", "d_b", "d_c") if c != name]
         tests[name] = lambda a, b, o=others: (
@@ -92,6 +99,18 @@ def _speed_left(recording, by_angle, a, b, period) -> bool:
     )
     speed = recording["omega_e"][a] * period
     return bool(max(abs(first - speed), abs(second - speed)) * (b - a) > 3.0 and abs(first - second) * (b - a) > 1.0)
+
+
+def _others_live(recording, name, a, b, rated) -> bool:
+    """Whether the other dq current differs from row to row, and current, speed or voltage change over the run."""
+    other, rows = {"i_d": "i_q", "i_q": "i_d"}[name], slice(a, b + 1)
+    whole = b - a + 1 >= len(recording)  # a constant that was never measured
+    if whole or other not in recording.columns or np.mean(np.diff(recording[other][rows]) != 0.0) < LIVE:
+        return False
+    voltages = [c for c in ("u_d_ref", "u_q_ref", "d_a", "d_b", "d_c") if c in recording.columns]
+    moved = [_change(recording, [c], a, b) > MOVED * np.max(np.abs(recording[c])) for c in (*voltages, *SPEED)
+             if c in recording.columns]  # fmt: skip
+    return _change(recording, [other], a, b) > 2 * CURRENT * rated or sum(moved) >= 2
 
 
 def _change(recording, names, a, b) -> float:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Angles in degrees or turns, angles and speeds of the shaft, speeds in rpm: recognised by the fit and converted.
+"""Angles in degrees, turns or codes, angles and speeds of the shaft, speeds in rpm: recognised by the fit, converted.
 
 Each unit of the angle is tested with the nominal stator balance; each unit of the speed with the advance of the angle,
 or without an angle with the steady dq balance.  A unit is accepted only if the unchanged columns do not fit and it
@@ -20,6 +20,7 @@ from fluxproof.diagnosis.ground.recording import Problem
 STAGE = "units"
 TURN = 2.0 * math.pi
 CLOSE = 0.05
+LEAST_BITS = 9  # of an encoder: 0 to 360 may be degrees
 
 
 def check(recording, nominal) -> None:
@@ -39,8 +40,8 @@ def check(recording, nominal) -> None:
         recording.problems.append(Problem("unit", f"the speed is in {unit}", "omega_e", 0, n, "converted"))
 
 
-def _angle_units(p) -> dict[str, float]:
-    units = {"degrees": math.pi / 180, "turns": TURN}
+def _angle_units(p, bits=None) -> dict[str, float]:
+    units = {"degrees": math.pi / 180, "turns": TURN} | ({f"codes of {bits} bits": TURN / 2**bits} if bits else {})
     if p > 1:
         units |= {
             "rad of the shaft": p,
@@ -73,7 +74,7 @@ def _angle_unit(recording, nominal, p):
     rows = rows_of(recording, nominal)
     if without_speed:
         del recording.columns["omega_e"]
-    units = _angle_units(p)
+    units = _angle_units(p, _bits(recording["theta_e"]))
     if isinstance(rows, FastRows) and discriminates(rows):
         as_is = _best_direction(rows, 1.0)
         if as_is <= FIT:
@@ -91,9 +92,18 @@ def _angle_unit(recording, nominal, p):
         return None
     for unit, factor in units.items():
         ratio = angle_speed_ratio(recording, nominal.sample_time_s, factor)
-        if ratio is not None and abs(abs(ratio) - 1.0) < CLOSE and unit.startswith("degrees"):
+        if ratio is not None and abs(abs(ratio) - 1.0) < CLOSE and unit.startswith(("degrees", "codes")):
             return unit, factor
     return None
+
+
+def _bits(theta) -> int | None:
+    """Number of bits of an encoder's codes of one turn; None for an angle that is not whole numbers from 0 on."""
+    low, high = float(theta.min()), float(theta.max())
+    if low < 0.0 or low > 0.02 * high or high < 2**LEAST_BITS / 1.02 or np.any(theta != np.round(theta)):
+        return None
+    bits = round(math.log2(high + 1.0))
+    return bits if (1.0 - 0.02) * 2**bits < high <= 2**bits else None
 
 
 def _best_direction(rows, factor) -> float:

@@ -92,7 +92,7 @@ def stray_order(view, residual, floor, known=()) -> Stray | None:
     """
     p, m, level = view.machine.pole_pairs, residual.shape[1], voltage_level(view)
     most = max(MOST_ORDER, MOST_ELECTRICAL * p)
-    turns = np.abs(view.theta[:, -1] - view.theta[:, 0]) / (2 * np.pi * p)
+    turns = np.where(view.locked, np.abs(view.theta[:, -1] - view.theta[:, 0]) / (2 * np.pi * p), 0.0)
     tapered = residual * (1.0 - np.cos(2 * np.pi * (np.arange(m) + 0.5) / m))
     turn, wave, found = np.exp(-1j * view.theta_mid / p), 1.0, {}
     for n in range(1, most + 1):

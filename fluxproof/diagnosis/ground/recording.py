@@ -14,6 +14,7 @@ Canonical columns (only ``t`` is required here; columns.py checks what a balance
     temp_winding         degC
     torque               Nm     at the shaft, positive with positive speed when motoring
     u_a u_b u_c          V      measured at the terminals of a machine without current (EMF run), or u_ab u_bc u_ca
+    fault enable         1      of the inverter: its gates are off where fault is not 0 or enable is 0
     u_line i_line p_el   V A W  amplitudes and power of a power analyser, in a table with i_d_ref i_q_ref or i_d i_q
 """
 
@@ -53,6 +54,8 @@ COLUMNS = {
     "u_line": "V",
     "i_line": "A",
     "p_el": "W",
+    "fault": "1",
+    "enable": "1",
 }
 
 

@@ -33,9 +33,10 @@ from fluxproof.diagnosis.ingest.demand import LINE_VOLTAGES, PHASE_VOLTAGES, is_
 from fluxproof.diagnosis.ingest.entries import entry_of, nearest
 from fluxproof.diagnosis.ingest.stated import constants_of
 from fluxproof.diagnosis.ingest.units import COMMANDED, OF_BUS, conversion, known_units, split_unit
-from fluxproof.diagnosis.ingest.usual_names import usual
+from fluxproof.diagnosis.ingest.usual_names import TOLD, usual
 from fluxproof.diagnosis.readers.table import Table, shown
 
+MOST_GUESSES = 6
 WORTH_NAMING = ("torque", "temp_winding", "omega_e", "u_dc")  # which a diagnosis does without if they are not found
 
 
@@ -267,5 +268,28 @@ def _guesses(missing, names) -> str:
     wanted = [w for w in COLUMNS if any(w in re.findall(r"\w+", text) for text in missing)]
     simple = {name.lower().replace("_", ""): name for name in names if split_unit(name)[0] not in COLUMNS}
     close = {w: difflib.get_close_matches(w.replace("_", ""), list(simple), n=1, cutoff=0.6) for w in wanted}
-    pairs = [f"{shown(simple[match[0]], 24)!r} for {w}" for w, match in close.items() if match][:3]
-    return f"; perhaps {', '.join(pairs)}" if pairs else ""
+    likely = {w: simple[match[0]] for w, match in close.items() if match}
+    nearly = _nearly_usual(names)
+    if found := {w: nearly[w] for w in wanted if w in nearly}:
+        likely = found | {w: column for w, column in likely.items() if column not in found.values() and w == "omega_e"}
+    pairs = [f"{shown(column, 24)!r} for {w}{_with_unit(w)}" for w, column in likely.items()]
+    return f"; perhaps {', '.join(pairs[: MOST_GUESSES if found else 3])}" if pairs else ""
+
+
+def _nearly_usual(names) -> dict[str, str]:
+    """{canonical name: column} of usual names that count only with a unit, such as "n", or lack a number: "vd1"."""
+    out: dict[str, str] = {}
+    for name in names:
+        bare = split_unit(name)[0].strip().lower()
+        if bare in TOLD and TOLD[bare][0] == "omega_e":
+            out.setdefault("omega_e", name)
+        found = re.fullmatch(r"(.*[^\d_])_?\d", split_unit(name)[0])
+        known = usual(found.group(1), "") if found else None
+        if known:
+            out.setdefault(known[0], name)
+    return out
+
+
+def _with_unit(name) -> str:
+    """What a proposal for a column must say of its unit: an undocumented speed may be of the shaft, or in rpm."""
+    return f" if its unit is stated, {{name = {name!r}, unit = 'rpm'}} or 'rad/s'" if name == "omega_e" else ""

@@ -19,7 +19,7 @@ from fluxproof.diagnosis.ingest.units import conversion, known_units
 from fluxproof.quote import shown
 from golden_model.drive_keys import RANGES, is_finite
 
-MEASURED = ("t", "u_a", "u_b", "u_c", "u_ab", "u_bc", "u_ca")  # a constant would state nothing
+MEASURED = ("t", "u_a", "u_b", "u_c", "u_ab", "u_bc", "u_ca", "fault", "enable")  # a constant would state nothing
 
 
 def constants_of(nominal) -> dict[str, float]:

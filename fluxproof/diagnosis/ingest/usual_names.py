@@ -34,6 +34,8 @@ NAMES: dict[str, tuple[str, ...]] = {
     "u_dc": ("u_dc", "udc", "v_dc", "vdc", *_written("uv", ("bus", "bat", "zk", "dclink")), "dc_bus", "bus_voltage"),
     "torque": ("torque",),
     "temp_winding": ("temp_winding",),
+    "fault": ("fault", "fault_code", "faults", "error_code", "err_code"),
+    "enable": ("enable", "enabled", "pwm_enable", "pwm_on", "gate_enable", "gates_on", "drive_enabled"),
 }
 for _phase, _marks in PHASES.items():
     NAMES[f"i_{_phase}"] = (*_written("i", _marks), *(f"current_{m}" for m in _marks))

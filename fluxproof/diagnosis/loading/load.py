@@ -92,7 +92,10 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
     if timeless and is_table(columns, nominal):
         return as_table(path, columns, meta, table.problems)
     if "t" not in columns:
-        step = table.meta.get("sample_time_s") or plan.sample_time_s or nominal.sample_time_s
+        known = table.meta.get("sample_time_s") or plan.sample_time_s
+        step = known or nominal.sample_time_s
+        if not known:
+            meta["assumed_step_s"] = step
         columns["t"] = step * np.arange(n)
         notes.append(f"no time column: rows are assumed to be {step:g} s apart")
     if plan.run and plan.run in table.columns:

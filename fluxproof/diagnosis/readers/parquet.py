@@ -15,6 +15,7 @@ from fluxproof.diagnosis.readers.table import Table, chosen, repeated, row_limit
 FORMAT = "Parquet"
 SUFFIXES = (".parquet", ".pq")
 LIBRARIES = ("pyarrow.parquet",)
+UNNAMED_INDEX, TIME = "__index_level_0__", "t"  # the name that pandas gives it
 
 
 def matches(head: bytes, path) -> bool:
@@ -28,13 +29,13 @@ def read(path, select=None) -> Table:
 
     file = pq.ParquetFile(pa.OSFile(str(path)))  # never an address of a remote store
     schema = file.schema_arrow
-    numeric, text = {}, []
+    numeric, text, called = {}, [], _called(schema, pa)
     for column in schema:
         kind = column.type
         if pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind):
             numeric[column.name] = (column.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
-        elif pa.types.is_decimal(kind) or pa.types.is_timestamp(kind):
-            numeric[column.name] = ""
+        elif pa.types.is_decimal(kind) or _is_time(kind, pa):
+            numeric[called.get(column.name, column.name)] = ""
         else:
             text.append(column.name)
     names = chosen(numeric, select, path, repeated(schema.names))
@@ -43,23 +44,37 @@ def read(path, select=None) -> Table:
     if rows == 0:
         raise RecordingError(f"{path}: no rows")
     check_cells(path, min(rows, limit) * len(names))
-    _check_pages(path, file.metadata, names)
+    stored = {shown_name: name for name, shown_name in called.items()}
+    in_file = [stored.get(name, name) for name in names]
+    _check_pages(path, file.metadata, in_file)
     # Batch by batch, so that a size declared by a damaged or hostile footer is never allocated at once.
     parts: dict[str, list[np.ndarray]] = {name: [] for name in names}
     have = 0
-    for batch in file.iter_batches(batch_size=1 << 18, columns=names):
-        for name in names:
-            parts[name].append(_floats(batch.column(name), pa)[: limit - have])
+    for batch in file.iter_batches(batch_size=1 << 18, columns=in_file):
+        for name, column in zip(names, in_file, strict=True):
+            parts[name].append(_floats(batch.column(column), pa)[: limit - have])
         have += batch.num_rows
         if have >= limit:
             break
     columns = {name: np.concatenate(values) for name, values in parts.items()}
-    when = [name for name, values in columns.items() if values.dtype.kind == "M"]
+    when = [name for name, values in columns.items() if values.dtype.kind in "mM"]
     columns |= {name: seconds(columns[name]) for name in when}
     table = Table(columns, {n: u for n, u in numeric.items() if u}, text=text, meta={"moments": when} if when else {})
+    if called and when and stored.keys() & set(when):
+        table.notes.append("the index of the table, which has no name, is read as the time")
     if rows > limit:
         table.problems.append(too_long(limit, rows))
     return table
+
+
+def _called(schema, pa) -> dict[str, str]:
+    """{column: "t"} of a table's index without a name, if it is a time and no column is called so."""
+    index = [c.name for c in schema if c.name == UNNAMED_INDEX and _is_time(c.type, pa)]
+    return {} if TIME in schema.names else dict.fromkeys(index, TIME)
+
+
+def _is_time(kind, pa) -> bool:
+    return pa.types.is_timestamp(kind) or pa.types.is_duration(kind)
 
 
 def _check_pages(path, metadata, names) -> None:
@@ -77,9 +92,11 @@ def _check_pages(path, metadata, names) -> None:
 
 
 def _floats(array, pa) -> np.ndarray:
-    """One column of a batch as float64, nulls as NaN; a timestamp as datetime64."""
+    """One column of a batch as float64, nulls as NaN; a timestamp as datetime64, a duration as timedelta64."""
     if pa.types.is_timestamp(array.type):
         return array.cast(pa.timestamp("ns", array.type.tz)).to_numpy(zero_copy_only=False)
+    if pa.types.is_duration(array.type):
+        return array.cast(pa.duration("ns")).to_numpy(zero_copy_only=False)
     if not pa.types.is_floating(array.type):
         array = array.cast(pa.float64())
     return array.to_numpy(zero_copy_only=False).astype(float, copy=False)

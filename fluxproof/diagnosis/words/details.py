@@ -7,6 +7,9 @@ from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.quantities import ascii_of, quantity
 from fluxproof.diagnosis.words.phrases import CORRECTED, as_if, capital, part_text, percent_below, said
 
+TOLD = ("gates_off", "stuck", "late", "lost_rows")  # codes of findings without which the figures cannot be read
+UNUSED = "rows not used"
+
 
 def details(answer, sentence, effects) -> str:
     """The figures behind the headline: every parameter that is not in ``sentence``, the misfit at held-out points."""
@@ -36,6 +39,10 @@ def details(answer, sentence, effects) -> str:
     read = [p.message for p in answer.problems if p.action in CORRECTED]
     if read:
         parts.append(f"Corrected while reading: {'; '.join(read)}.")
+    for p in answer.problems:
+        if p.code in TOLD and not p.fatal:
+            rows = f" ({p.count} rows not used)" if p.action == UNUSED else f" ({p.action})"
+            parts.append(f"{capital(p.located() if p.code == 'stuck' else p.message)}{rows}.")
     if len(answer.remainder) > 1:
         parts.append(f"The largest residuals are {', '.join(part_text(r) for r in answer.remainder[:3])}.")
     return " ".join(parts)

@@ -23,20 +23,32 @@ from fluxproof.diagnosis.words.phrases import (
     title_of,
 )
 
+ASSUMED = ("assumed_time",)  # codes of findings
+REASONS = (*ASSUMED, "gates_off", "repeated", "gap", "dropped", "stuck", "slow_sampling")
+MOST_BESIDE = 2
 MOST_LETTERS = 200  # two lines of a terminal or of the report; only what the checks or the replay found may be longer
 
 
 def headline(answer, effects) -> str:
     """The verdict of an answer as a headline; effects: the catalogue."""
-    variants = _variants(answer, effects)
-    return next((text for text in variants if len(text) <= MOST_LETTERS), variants[-1])
+    variants, beside = _variants(answer, effects), _beside(answer)
+    most = MOST_LETTERS - len(beside)
+    return next((text for text in variants if len(text) <= most), variants[-1]) + beside
+
+
+def _beside(answer) -> str:
+    """What the answer rests on and nothing confirms, and beside a refusal what the checks found before."""
+    codes = REASONS if answer.verdict == "bad_recording" else ASSUMED
+    found = dict.fromkeys(p.message for p in answer.problems if p.code in codes and not p.fatal)
+    return "".join(f" {capital(message)}." for message in list(found)[:MOST_BESIDE])
 
 
 def _variants(answer, effects) -> list[str]:
     """The headline from the most detailed one to the shortest."""
     if answer.verdict == "bad_recording":
         worst = next(p for p in answer.problems if p.fatal)
-        return [f"The recording cannot be used: {worst.located()}"]
+        text = f"The recording cannot be used: {worst.located()}"
+        return [f"{text.rstrip('.')}." if _beside(answer) else text]
     if answer.verdict == "digital_mismatch":
         return [_mismatch(answer.digital.first_difference)]
     misfit = ascii_of(quantity(answer.fit.train_before, answer.fit.unit, 3))

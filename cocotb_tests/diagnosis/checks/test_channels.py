@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Channels that are stuck, late, of another sign or in codes, and what the rows of a file without a time rest on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from cocotb_tests.support.drives import BUS, L_D, L_Q, PLAIN, PSI, R
+from cocotb_tests.support.recordings.from_equations import T, codes, dq_made, made, nominal_of, write
+from fluxproof.diagnosis.checks import check_recording
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.loading.load import load_recording
+
+THIRDS = np.exp(2j * np.pi / 3 * np.arange(3))
+
+
+@pytest.fixture(scope="module")
+def nominal(tmp_path_factory):
+    return nominal_of(tmp_path_factory.mktemp("drive"))
+
+
+def dq_log():
+    """``made`` as a control logs it in dq: references are valid in the middle of their period."""
+    x = made()
+    turn = np.exp(1j * x["theta_e"])
+    i = 2 / 3 * sum(x[f"i_{p}"] * t for p, t in zip("abc", THIRDS, strict=True)) / turn
+    u = 2 / 3 * sum(x[f"d_{p}"] * t for p, t in zip("abc", THIRDS, strict=True)) * x["u_dc"] / turn
+    u = u * np.exp(-1.5j * x["omega_e"] * T)
+    kept = {name: x[name] for name in ("t", "theta_e", "omega_e", "u_dc")}
+    return kept | {"i_d": i.real, "i_q": i.imag, "u_d_ref": u.real, "u_q_ref": u.imag}
+
+
+def stepped():
+    """A dq log of a current control at 400 rad/s, with steps of both currents that settle within 20 rows."""
+    rng, n, omega = np.random.default_rng(5), 4000, 400.0
+    levels = rng.uniform(-4.0, 4.0, (8, 2)) @ np.array([1.0, 1j])
+    i = np.repeat(levels, n // 8)
+    for k in range(1, n):
+        i[k] = i[k - 1] + 0.25 * (i[k] - i[k - 1])
+    ahead, mean = np.append(i[1:], i[-1]), 0.5 * (i + np.append(i[1:], i[-1]))
+    flux = L_D * mean.real + 1j * L_Q * mean.imag + PSI
+    u = R * mean + (L_D * (ahead - i).real + 1j * L_Q * (ahead - i).imag) / T + 1j * omega * flux
+    u = np.roll(u, -1)  # in force one period later
+    table = {"t": np.arange(n) * T, "theta_e": np.mod(omega * T * np.arange(n), 2 * np.pi)}
+    table |= {"omega_e": np.full(n, omega), "u_dc": np.full(n, BUS)}
+    noisy = {"i_d": (i.real, 0.004), "i_q": (i.imag, 0.004), "u_d_ref": (u.real, 0.05), "u_q_ref": (u.imag, 0.05)}
+    return table | {name: x + size * rng.normal(size=n) for name, (x, size) in noisy.items()}
+
+
+def load(tmp_path, nominal, table):
+    return load_recording(write(tmp_path / "r.parquet", table), nominal)
+
+
+def from_middle(values, value=None):
+    values = values.copy()
+    values[2000:] = values[2000] if value is None else value
+    return values
+
+
+@pytest.mark.parametrize("name", ["i_d", "i_q"])
+def test_a_dq_current_that_sticks_while_the_other_goes_on(tmp_path, nominal, name):
+    table = dq_log()
+    recording = load(tmp_path, nominal, table | {name: from_middle(table[name])})
+    assert codes(recording) == ["stuck"] and recording.problems[0].column == name
+    assert not recording.usable[2000:].any() and recording.usable[:1999].all()
+
+
+def test_a_dq_current_that_was_never_measured_is_not_stuck(tmp_path, nominal):
+    assert "stuck" not in codes(load(tmp_path, nominal, dq_log() | {"i_d": np.zeros(4000)}))
+
+
+@pytest.mark.parametrize("name, value, code", [("theta_e", None, "stuck"), ("u_dc", 0.0, "u_dc_range")])
+def test_half_a_channel_is_no_wrong_machine(tmp_path, nominal, name, value, code):
+    table = made()
+    recording = load(tmp_path, nominal, table | {name: from_middle(table[name], value)})
+    assert codes(recording) == [code] and "restated" not in recording.meta
+    assert recording.usable[:1999].all()
+
+
+@pytest.mark.parametrize("name, rows", [("i_q", 3), ("i_d", 2), ("u_q_ref", 2), ("u_d_ref", 4)])
+def test_a_late_column_is_realigned(tmp_path, nominal, name, rows):
+    table = stepped()
+    late = np.append(np.full(rows, table[name][0]), table[name][:-rows])
+    recording = load(tmp_path, nominal, table | {name: late})
+    assert codes(recording) == ["late"] and f"{name} is {rows} rows late" in recording.problems[0].message
+    np.testing.assert_allclose(recording[name][:-rows], table[name][:-rows])
+    assert not recording.usable[-rows:].any()
+
+
+@pytest.mark.parametrize("late", [0, 1, 2])
+def test_both_voltages_late_are_a_delay_of_the_drive(tmp_path, nominal, late):
+    table = stepped()
+    for name in ("u_d_ref", "u_q_ref"):
+        table[name] = np.roll(table[name], late)
+    assert "late" not in codes(load(tmp_path, nominal, table))
+
+
+def test_one_of_two_currents_of_the_wrong_sign(tmp_path, nominal):
+    table = made()
+    two = {name: values for name, values in table.items() if name != "i_c"} | {"i_b": -table["i_b"]}
+    recording = load(tmp_path, nominal, two)
+    assert codes(recording) == ["sign"] and recording.problems[0].column == "i_b"
+    np.testing.assert_allclose(recording["i_b"], table["i_b"])
+
+
+def test_currents_in_codes_around_their_middle_are_refused(tmp_path, nominal):
+    table = made()
+    recording = load(tmp_path, nominal, table | {c: 2048.0 + 100 * table[c] for c in ("i_a", "i_b", "i_c")})
+    assert recording.fatal and "codes" in recording.problems[-1].message and "offset" in recording.problems[-1].message
+
+
+@pytest.mark.parametrize("bits", [12, 16])
+def test_the_codes_of_an_encoder_are_an_angle(tmp_path, nominal, bits):
+    table = made()
+    codes_of = np.round(table["theta_e"] / (2 * np.pi) * 2**bits)
+    recording = load(tmp_path, nominal, table | {"theta_e": codes_of})
+    assert codes(recording) == ["unit"] and f"{bits} bits" in recording.problems[0].message
+    np.testing.assert_allclose(recording["theta_e"], table["theta_e"], atol=2 * np.pi / 2**bits)
+
+
+def test_an_index_of_moments_without_a_name_is_the_time(tmp_path, nominal):
+    table = dq_made()
+    stamps = pd.Timestamp("2026-11-20") + pd.to_timedelta(table["t"], unit="s")
+    for index in (stamps, pd.to_timedelta(table["t"], unit="s")):
+        frame = pd.DataFrame({n: v for n, v in table.items() if n != "t"}).set_index(pd.Index(index))
+        frame.to_parquet(tmp_path / "r.parquet")
+        recording = load_recording(tmp_path / "r.parquet", nominal)
+        np.testing.assert_allclose(recording["t"], table["t"], atol=1e-6)
+        assert any("index" in note for note in recording.meta["notes"])
+
+
+def without(table, *names):
+    return {n: v for n, v in table.items() if n not in names}
+
+
+def test_a_missing_time_is_told_unless_angle_and_speed_confirm_it(tmp_path, nominal):
+    assert codes(load(tmp_path, nominal, without(made(), "t"))) == []
+    assert codes(load(tmp_path, nominal, without(dq_log(), "t", "theta_e"))) == ["assumed_time"]
+    assert codes(load(tmp_path, nominal, without(made(), "t", "omega_e"))) == ["assumed_time"]
+
+
+def test_a_missing_time_and_sample_time_are_told(tmp_path):
+    (tmp_path / "drive.toml").write_text(PLAIN)
+    recording = load(tmp_path, load_nominal(tmp_path / "drive.toml"), without(made(), "t"))
+    assert codes(recording) == ["assumed_time"] and "sample_time_s is not stated" in recording.problems[0].message
+
+
+def test_no_angle_shows_no_harmonics(tmp_path, nominal):
+    recording = load(tmp_path, nominal, without(dq_log(), "theta_e"))
+    assert "harmonics" in recording.lacks and recording.meta["angle"] == "integrated"
+    check_recording(recording, nominal)
+    assert codes(recording) == []
+
+
+def test_single_lost_rows_are_filled_where_no_stretch_is_whole(tmp_path, nominal):
+    table = made(noise=0.0)
+    lost = np.flatnonzero(np.random.default_rng(6).random(3998) < 0.06) + 1
+    recording = load(tmp_path, nominal, {n: np.delete(v, lost) for n, v in table.items()})
+    assert codes(recording) == ["gap", "lost_rows"] and len(recording) > 3990
+    rows = np.round(recording["t"] / T).astype(int)
+    assert recording.joined[:-1].sum() >= len(recording) - 20 and np.array_equal(rows, np.unique(rows))
+    settled = slice(100, 900)
+    for name in ("i_a", "d_b", "theta_e"):
+        off = np.abs(recording[name][settled] - table[name][rows[settled]])
+        assert np.percentile(off, 98) < 0.01 * np.ptp(table[name])
+
+
+def test_a_few_lost_rows_are_left_as_gaps(tmp_path, nominal):
+    recording = load(tmp_path, nominal, {n: np.delete(v, [700, 1500, 3000]) for n, v in made().items()})
+    assert codes(recording) == ["gap"] and len(recording) == 3997
