@@ -37,6 +37,7 @@ def _angle(degrees, meaning):
 READINGS = (
     # the drive file
     _machine("machine_line_rl", (*R, *L), 2.0, "R, L_d and L_q are line-to-line values, twice the phase values"),
+    _machine("machine_half_rl", (*R, *L), 0.5, "R, L_d and L_q are half the phase values"),
     _machine("resistance_line", R, 2.0, "the resistance is a line-to-line value, twice the phase value"),
     _machine("inductances_line", L, 2.0, "L_d and L_q are line-to-line values, twice the phase values"),
     _machine("psi_line", PSI, ROOT3, "the magnet flux is a line-to-line value, 1.7321 of the phase value"),

@@ -66,6 +66,8 @@ LEFT_OUT = 0.05
 OPEN = 0.02
 # Least sum of the probabilities of its effects at which an ambiguity is reported.
 TOGETHER = 0.5
+# Difference of an effect's parameter, relative to it, between alternatives that makes it a part of what is not known.
+DEPENDS = 0.2
 # Least probability at which an effect that is not reported still counts towards the explained share.
 LIKELY = 0.5
 # Discrepancy, in standard deviations of the balance's error, that is accepted without penalty.

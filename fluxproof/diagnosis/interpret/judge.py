@@ -81,14 +81,21 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
         value = other.best().value + prior + terms.jacobian(j.readings)
         left = other.best().names
         met = is_exact(j.readings, left, setup.effects) and is_simpler(j.readings, left, most, absurd)
+        # What is left beside one of several readings must have one size under all of them.
+        met = met and all(is_exact((r,), left, setup.effects) for r in _rivals(j, good))
         if value > known and met:
             best, known, found = j, value, other
         if best is j and not other.best().names:
             break  # nothing is left that another reading could explain
     if best is None:
         return (), [], posterior
-    rivals = [j.readings[0] for j in good if j.readings != best.readings and len(best.readings) == 1 and _same(j, best)]
-    return best.readings, rivals, found
+    return best.readings, _rivals(best, good), found
+
+
+def _rivals(judged, good) -> list[Reading]:
+    """The readings that leave the same balance as a single one; good: all that are better than what is documented."""
+    alone = len(judged.readings) == 1
+    return [j.readings[0] for j in good if alone and j.readings != judged.readings and _same(j, judged)]
 
 
 def _read(setup, codes) -> Setup:
