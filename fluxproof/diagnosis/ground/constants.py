@@ -54,6 +54,8 @@ MISREAD = 2e-3
 # Log evidence that any effect costs: prior odds of 1 to 19, and the width of its prior.  A convention that cannot gain
 # as much by leaving no effect is not searched.
 ONE_EFFECT = 7.0
+# Odds at which a convention that leaves more than the usual error is preferred to free sizes of the constants.
+CLEARLY = 20.0
 # Least number of operating points: at fewer some convention meets any constant misfit.
 READ_POINTS = 3
 
