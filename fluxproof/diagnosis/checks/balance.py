@@ -74,7 +74,7 @@ def rows_of(recording, nominal) -> Rows | None:
     phases, duties = recording.has("i_a", "i_b"), recording.has("d_a", "d_b", "d_c", "u_dc")
     dq_only = recording.slow or not (phases and duties)
     needed = ("omega_e", "i_d", "i_q", "u_q_ref") if dq_only else ("omega_e", "theta_e")
-    if not recording.has(*needed) or not (recording.has("theta_e") or recording.slow):
+    if not recording.has(*needed):
         return None
     k = np.flatnonzero(recording.usable) if recording.points else _intervals(recording, delay)
     if len(k) < (LEAST_OF_TABLE if recording.points else LEAST_ROWS):

@@ -267,5 +267,10 @@ def _guesses(missing, names) -> str:
     wanted = [w for w in COLUMNS if any(w in re.findall(r"\w+", text) for text in missing)]
     simple = {name.lower().replace("_", ""): name for name in names if split_unit(name)[0] not in COLUMNS}
     close = {w: difflib.get_close_matches(w.replace("_", ""), list(simple), n=1, cutoff=0.6) for w in wanted}
-    pairs = [f"{shown(simple[match[0]], 24)!r} for {w}" for w, match in close.items() if match][:3]
+    pairs = [f"{shown(simple[match[0]], 24)!r} for {w}{_with_unit(w)}" for w, match in close.items() if match][:3]
     return f"; perhaps {', '.join(pairs)}" if pairs else ""
+
+
+def _with_unit(name) -> str:
+    """What a proposal for a column must say of its unit: an undocumented speed may be of the shaft, or in rpm."""
+    return f" if its unit is stated, {{name = {name!r}, unit = 'rpm'}} or 'rad/s'" if name == "omega_e" else ""

@@ -28,8 +28,16 @@ MOST_LETTERS = 200  # two lines of a terminal or of the report; only what the ch
 
 def headline(answer, effects) -> str:
     """The verdict of an answer as a headline; effects: the catalogue."""
-    variants = _variants(answer, effects)
+    variants = [f"{text}{_guessed(answer)}" for text in _variants(answer, effects)]
     return next((text for text in variants if len(text) <= MOST_LETTERS), variants[-1])
+
+
+def _guessed(answer) -> str:
+    """The units that only the numbers gave away, as a sentence: the answer rests on them."""
+    found = dict.fromkeys(p.message for p in answer.problems if p.action == "converted")
+    if not found or answer.verdict in ("bad_recording", "digital_mismatch", "no_mismatch"):  # these name it themselves
+        return ""
+    return f" By its numbers, {joined(list(found))}."
 
 
 def _variants(answer, effects) -> list[str]:
