@@ -47,12 +47,22 @@ class _Intervals:
 
 @dataclass(frozen=True)
 class FastRows(_Intervals):
-    """i, d: (2, m, 3) phase currents [A] and (m, 3) duties in force; u_dc: (m,) [V]."""
+    """i, d: (2, m, 3) phase currents [A] and (m, 3) duties in force; u_dc: (m,) [V].
+
+    third: whether i_c was measured, and not computed from the other two.
+    """
 
     i: Real
     d: Real
     u_dc: np.ndarray
+    third: bool = True
     steady = False
+
+    def with_currents(self, i: Real) -> FastRows:
+        """The rows with other phase currents; one that was not measured follows from the other two."""
+        if not self.third:
+            i = np.stack([i[..., 0], i[..., 1], -i[..., 0] - i[..., 1]], axis=-1)
+        return self.change(i=i)
 
 
 @dataclass(frozen=True)
@@ -92,7 +102,7 @@ def rows_of(recording, nominal) -> Rows | None:
     i_c = columns.get("i_c", -columns["i_a"] - columns["i_b"])
     i = np.stack([columns["i_a"][ends], columns["i_b"][ends], i_c[ends]], axis=-1)
     d = np.stack([columns[name][k - delay] for name in ("d_a", "d_b", "d_c")], axis=-1)
-    return FastRows(*common, i, d, columns["u_dc"][k])
+    return FastRows(*common, i, d, columns["u_dc"][k], "i_c" in columns)
 
 
 def _points(i_d, i_q, omega, machine) -> int:

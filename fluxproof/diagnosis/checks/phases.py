@@ -2,7 +2,8 @@
 """Swapped phases, reversed sensors, wrong rotation direction: the interpretation that the nominal machine fits is used.
 
 Every single change to the columns is tested with the nominal balance.  A change is accepted only if the recording does
-not fit unchanged, fits with the change, and fits clearly worse with any other change.  Mirrored interpretations
+not fit unchanged, fits with the change, and fits clearly worse with any other change, or with an angle that is merely
+off.  What leaves a tenth of the voltage is told and not corrected, as the causes of the catalogue leave less.  Mirrored interpretations
 (currents and duties both swapped, or the angle reversed) are equivalent; the angle is then reversed.  Of dq values a
 change must fit at large currents too, and better than any reading (conventions/).
 """
@@ -13,13 +14,14 @@ import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
 from fluxproof.diagnosis.checks.balance import BETTER, FIT, Rows, SteadyRows, discriminates, misfit, rows_of
-from fluxproof.diagnosis.checks.rival_readings import CLEAR, best_reading, misfit_of
+from fluxproof.diagnosis.checks.rival_readings import CLEAR, best_reading, misfit_of, turned_misfit
 from fluxproof.diagnosis.ground.arrays import Complex
 from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "geometry"
 SMALL = 0.03  # of the voltage: a smaller misfit is indistinguishable from noise
 NOTHING = 0.8  # of the voltage: larger than any effect
+LEFT = 0.1  # of the voltage: what a correction may leave; an effect of that size competes with it
 D_CURRENT = 0.08  # of rated current: less does not tell the signs of single axes
 
 ORDERS = {
@@ -44,7 +46,9 @@ def check(recording, nominal) -> None:
         changes = {c: changed for c, changed in changes.items() if rows.steady or c[0] in ("currents", "sign")}
     if as_is < (SMALL if at_current else FIT):
         return
-    tried = {name: misfit_of(changed, at_current) for name, changed in changes.items()}
+    # At large currents alone a change may fit that another operating point contradicts.
+    modes = (False, True) if at_current else (False,)
+    tried = {name: max(misfit_of(changed, mode) for mode in modes) for name, changed in changes.items()}
     ranked = sorted(tried, key=tried.__getitem__)
     best = ranked[0]
     n = len(recording)
@@ -66,6 +70,10 @@ def check(recording, nominal) -> None:
         message = f"{_words(best)} or {second}: {numbers}; correct [columns] in drive.toml"
         recording.problems.append(Problem("swapped_phases", message, _column(best), 0, n, fatal=True))
         return
+    if tried[best] > LEFT or turned_misfit(rows) < CLEAR * tried[best]:
+        message = f"{_words(best)}, or the angle is off: {numbers}"
+        recording.problems.append(Problem("no_fit", message, _column(best), 0, n, "the recording is used unchanged"))
+        return
     _apply(recording, best, nominal.sample_time_s)
     code = {"angle": "rotation", "speed": "rotation", "sign": "sign"}.get(best[0], "swapped_phases")
     recording.problems.append(Problem(code, f"{_words(best)}: {numbers}", _column(best), 0, n, "corrected"))
@@ -77,13 +85,13 @@ def _changes(rows: Rows) -> dict[tuple, Rows]:
         return _dq_changes(rows)
     changes: dict[tuple, Rows] = {("angle", ""): rows.change(theta=-rows.theta), ("sign", "i"): rows.change(i=-rows.i)}
     for name, order in ORDERS.items():
-        changes["currents", name] = rows.change(i=rows.i[..., order])
+        changes["currents", name] = rows.with_currents(rows.i[..., order])
         changes["duties", name] = rows.change(d=rows.d[..., order])
         if name != "b and c":
-            changes["both", name] = rows.change(i=rows.i[..., order], d=rows.d[..., order])
-    for phase in range(3):
+            changes["both", name] = rows.with_currents(rows.i[..., order]).change(d=rows.d[..., order])
+    for phase in range(3 if rows.third else 2):
         sign = np.where(np.arange(3) == phase, -1.0, 1.0)
-        changes["sign", CURRENTS[phase]] = rows.change(i=rows.i * sign)
+        changes["sign", CURRENTS[phase]] = rows.with_currents(rows.i * sign)
     return changes
 
 
@@ -99,6 +107,7 @@ def _dq_changes(rows: SteadyRows) -> dict[tuple, Rows]:
         ("sign", "u_d_ref u_q_ref"): rows.change(u_dq=-u),
         ("sign", "i_d u_d_ref"): rows.change(dq=-np.conj(i), u_dq=-np.conj(u)),
         ("sign", "u_q_ref"): rows.change(u_dq=np.conj(u)),
+        ("exchanged", "i_q u_q_ref"): rows.change(dq=i.real + 1j * u.imag, u_dq=u.real + 1j * i[0].imag),
     }
     if np.percentile(np.abs(i.real), 75) > D_CURRENT * rows.machine.rated_current_a:
         changes["sign", "i_d"] = rows.change(dq=-np.conj(i))
@@ -121,6 +130,8 @@ def _words(change) -> str:
     names = which.split()
     if what == "axes":
         return "the d and q axes are swapped" if len(names) == 4 else f"{' and '.join(names)} are swapped"
+    if what == "exchanged":
+        return f"{' and '.join(names)} are swapped"
     if what == "sign":
         if which == "i":
             return "the phase currents have the opposite sign"
@@ -152,6 +163,9 @@ def _apply(recording, change, period) -> None:
             columns["omega_e"] = -columns["omega_e"]
             if "torque" in columns:
                 columns["torque"] = -columns["torque"]
+    elif what == "exchanged":
+        a, b = which.split()
+        columns[a], columns[b] = columns[b], columns[a]
     elif what == "axes":
         for a, b in zip(*[iter(_with_references(which))] * 2, strict=True):
             if recording.has(a, b):
