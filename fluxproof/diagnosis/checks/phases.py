@@ -3,7 +3,7 @@
 
 Every single change to the columns is tested with the nominal balance.  A change is accepted only if the recording does
 not fit unchanged, fits with the change, and fits clearly worse with any other change, or with an angle that is merely
-off.  What leaves a tenth of the voltage is told and not corrected, as the causes of the catalogue leave less.  Mirrored interpretations
+off: that is told and not corrected.  Mirrored interpretations
 (currents and duties both swapped, or the angle reversed) are equivalent; the angle is then reversed.  Of dq values a
 change must fit at large currents too, and better than any reading (conventions/).
 """
@@ -21,7 +21,6 @@ from fluxproof.diagnosis.ground.recording import Problem
 STAGE = "geometry"
 SMALL = 0.03  # of the voltage: a smaller misfit is indistinguishable from noise
 NOTHING = 0.8  # of the voltage: larger than any effect
-LEFT = 0.1  # of the voltage: what a correction may leave; an effect of that size competes with it
 D_CURRENT = 0.08  # of rated current: less does not tell the signs of single axes
 
 ORDERS = {
@@ -70,7 +69,7 @@ def check(recording, nominal) -> None:
         message = f"{_words(best)} or {second}: {numbers}; correct [columns] in drive.toml"
         recording.problems.append(Problem("swapped_phases", message, _column(best), 0, n, fatal=True))
         return
-    if tried[best] > LEFT or turned_misfit(rows) < CLEAR * tried[best]:
+    if turned_misfit(rows) < CLEAR * tried[best]:
         message = f"{_words(best)}, or the angle is off: {numbers}"
         recording.problems.append(Problem("no_fit", message, _column(best), 0, n, "the recording is used unchanged"))
         return
