@@ -3,9 +3,9 @@
 
 Every single change to the columns is tested with the nominal balance.  A change is accepted only if the recording does
 not fit unchanged, fits with the change, and fits clearly worse with any other change, or with an angle that is merely
-off: that is told and not corrected.  Mirrored interpretations
-(currents and duties both swapped, or the angle reversed) are equivalent; the angle is then reversed.  Of dq values a
-change must fit at large currents too, and better than any reading (conventions/).
+off: that is told and not corrected.  Mirrored interpretations (currents and duties both swapped, or the angle reversed)
+are equivalent; the angle is then reversed.  Of dq values a change must fit at large currents too, and better than any
+reading (conventions/).
 """
 
 from __future__ import annotations

@@ -43,8 +43,7 @@ def misfit_of(rows: Rows, at_current: bool = False) -> float:
 
 
 def turned_misfit(rows: Rows) -> float:
-    """The least misfit with an angle that is off by any amount of TURNS, which hardly a single point tells from others.
-    """
+    """The least misfit with an angle that is off by up to TURNS, as one point hardly tells from other changes."""
     coarse = min(TURNS, key=lambda turn: misfit(turned(rows, turn)))
     return min(misfit(turned(rows, turn)) for turn in coarse + FINE)
 

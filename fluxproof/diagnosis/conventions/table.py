@@ -58,7 +58,9 @@ READINGS = (
     _machine("resistance_milli", R, 1e3, "the resistance is in milliohm"),
     # scales of recorded columns
     Reading("currents_rms", "i", "the currents are rms values, 0.7071 of the peak values", currents=ROOT2),
-    Reading("currents_double", "i", "the recorded currents are twice the true ones (peak to peak)", currents=0.5, unit=True),
+    Reading(
+        "currents_double", "i", "the recorded currents are twice the true ones (peak to peak)", currents=0.5, unit=True,
+    ),
     Reading("currents_half", "i", "the recorded currents are half the true ones", currents=2.0, unit=True),
     Reading(
         "currents_power_invariant", "i_d, i_q", "the dq currents are power-invariant, 1.2247 of the peak values",

@@ -48,9 +48,9 @@ def relative(effect, c: dict[str, dict], nominal) -> float:
 
 def restated(effects, c: dict[str, dict], nominal):
     """The drive to which the sizes of effects that restate nothing are added; c: {effect: coefficients}."""
-    for name in c:
+    for name, own in c.items():
         if isinstance(effects[name], Restates):
-            machine = replace(nominal.machine, **effects[name].of(nominal, c[name]))
+            machine = replace(nominal.machine, **effects[name].of(nominal, own))
             nominal = replace(nominal, machine=machine)
     return nominal
 

@@ -111,10 +111,8 @@ def requests(setup, fits, noise_v, cold=False) -> tuple[Planned, ...]:
         stack = np.array(list(columns.values())).reshape(len(columns), len(p.ok))
         knows.append((stack, known_of(s, columns)))
     formulas = [_formulas(s, of) for s in solutions]
-    pairs = [
-        (a, b) for a, b in itertools.permutations(range(len(solutions)), 2)
-        if _differ(formulas[a], formulas[b], np.isfinite(sigma)) or _differ(formulas[b], formulas[a], np.isfinite(sigma))
-    ]  # fmt: skip
+    seen, pairs = np.isfinite(sigma), list(itertools.permutations(range(len(solutions)), 2))
+    pairs = [(a, b) for a, b in pairs if any(_differ(formulas[m], formulas[n], seen) for m, n in ((a, b), (b, a)))]
     if not pairs:
         return ()
     rivals = [rivalry(predictions[a], predictions[b], *knows[b], sigma, p.block, len(omega)) for a, b in pairs]
