@@ -26,6 +26,7 @@ MOST_ROWS = 5000
 FIT = 0.25  # misfit over voltage: any real effect is smaller at speed
 BETTER = 0.3  # a change is accepted if the misfit falls below this share
 LEAST_ROWS, LEAST_OF_TABLE = 20, 6  # fewer fit by chance with some change
+EXACT = 1e-9  # of the currents: of their sum where one of them is computed from the other two
 LEAST_POINTS, SAME = 3, 0.1  # of dq values: operating points that are so far apart, of rated current and top speed
 
 
@@ -47,12 +48,22 @@ class _Intervals:
 
 @dataclass(frozen=True)
 class FastRows(_Intervals):
-    """i, d: (2, m, 3) phase currents [A] and (m, 3) duties in force; u_dc: (m,) [V]."""
+    """i, d: (2, m, 3) phase currents [A] and (m, 3) duties in force; u_dc: (m,) [V].
+
+    third: whether i_c was measured, and not computed from the other two.
+    """
 
     i: Real
     d: Real
     u_dc: np.ndarray
+    third: bool = True
     steady = False
+
+    def with_currents(self, i: Real) -> FastRows:
+        """The rows with other phase currents; one that was not measured follows from the other two."""
+        if not self.third:
+            i = np.stack([i[..., 0], i[..., 1], -i[..., 0] - i[..., 1]], axis=-1)
+        return self.change(i=i)
 
 
 @dataclass(frozen=True)
@@ -74,7 +85,7 @@ def rows_of(recording, nominal) -> Rows | None:
     phases, duties = recording.has("i_a", "i_b"), recording.has("d_a", "d_b", "d_c", "u_dc")
     dq_only = recording.slow or not (phases and duties)
     needed = ("omega_e", "i_d", "i_q", "u_q_ref") if dq_only else ("omega_e", "theta_e")
-    if not recording.has(*needed) or not (recording.has("theta_e") or recording.slow):
+    if not recording.has(*needed):
         return None
     k = np.flatnonzero(recording.usable) if recording.points else _intervals(recording, delay)
     if len(k) < (LEAST_OF_TABLE if recording.points else LEAST_ROWS):
@@ -92,7 +103,8 @@ def rows_of(recording, nominal) -> Rows | None:
     i_c = columns.get("i_c", -columns["i_a"] - columns["i_b"])
     i = np.stack([columns["i_a"][ends], columns["i_b"][ends], i_c[ends]], axis=-1)
     d = np.stack([columns[name][k - delay] for name in ("d_a", "d_b", "d_c")], axis=-1)
-    return FastRows(*common, i, d, columns["u_dc"][k])
+    measured = bool(np.max(np.abs(i.sum(axis=-1))) > EXACT * np.max(np.abs(i)))
+    return FastRows(*common, i, d, columns["u_dc"][k], measured)
 
 
 def _points(i_d, i_q, omega, machine) -> int:

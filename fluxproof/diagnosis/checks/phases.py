@@ -2,9 +2,10 @@
 """Swapped phases, reversed sensors, wrong rotation direction: the interpretation that the nominal machine fits is used.
 
 Every single change to the columns is tested with the nominal balance.  A change is accepted only if the recording does
-not fit unchanged, fits with the change, and fits clearly worse with any other change.  Mirrored interpretations
-(currents and duties both swapped, or the angle reversed) are equivalent; the angle is then reversed.  Of dq values a
-change must fit at large currents too, and better than any reading (conventions/).
+not fit unchanged, fits with the change, and fits clearly worse with any other change, or with an angle that is merely
+off: that is told and not corrected.  Mirrored interpretations (currents and duties both swapped, or the angle reversed)
+are equivalent; the angle is then reversed.  Of dq values a change must fit at large currents too, and better than any
+reading (conventions/).
 """
 
 from __future__ import annotations
@@ -12,15 +13,14 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
-from fluxproof.diagnosis.checks.balance import BETTER, FIT, Rows, SteadyRows, discriminates, misfit, rows_of
-from fluxproof.diagnosis.checks.rival_readings import CLEAR, best_reading, misfit_of
-from fluxproof.diagnosis.ground.arrays import Complex, Real
+from fluxproof.diagnosis.checks.balance import BETTER, EXACT, FIT, Rows, SteadyRows, discriminates, misfit, rows_of
+from fluxproof.diagnosis.checks.rival_readings import CLEAR, best_reading, misfit_of, turned_misfit
+from fluxproof.diagnosis.ground.arrays import Complex
 from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "geometry"
 SMALL = 0.03  # of the voltage: a smaller misfit is indistinguishable from noise
 NOTHING = 0.8  # of the voltage: larger than any effect
-EXACT = 1e-9  # of the currents: of their sum where one of them is computed from the other two
 D_CURRENT = 0.08  # of rated current: less does not tell the signs of single axes
 
 ORDERS = {
@@ -45,7 +45,9 @@ def check(recording, nominal) -> None:
         changes = {c: changed for c, changed in changes.items() if rows.steady or c[0] in ("currents", "sign")}
     if as_is < (SMALL if at_current else FIT):
         return
-    tried = {name: misfit_of(changed, at_current) for name, changed in changes.items()}
+    # At large currents alone a change may fit that another operating point contradicts.
+    modes = (False, True) if at_current else (False,)
+    tried = {name: max(misfit_of(changed, mode) for mode in modes) for name, changed in changes.items()}
     ranked = sorted(tried, key=tried.__getitem__)
     best = ranked[0]
     n = len(recording)
@@ -67,6 +69,10 @@ def check(recording, nominal) -> None:
         message = f"{_words(best)} or {second}: {numbers}; correct [columns] in drive.toml"
         recording.problems.append(Problem("swapped_phases", message, _column(best), 0, n, fatal=True))
         return
+    if turned_misfit(rows) < CLEAR * tried[best]:
+        message = f"{_words(best)}, or the angle is off: {numbers}"
+        recording.problems.append(Problem("no_fit", message, _column(best), 0, n, "the recording is used unchanged"))
+        return
     _apply(recording, best, nominal.sample_time_s)
     code = {"angle": "rotation", "speed": "rotation", "sign": "sign"}.get(best[0], "swapped_phases")
     recording.problems.append(Problem(code, f"{_words(best)}: {numbers}", _column(best), 0, n, "corrected"))
@@ -78,22 +84,14 @@ def _changes(rows: Rows) -> dict[tuple, Rows]:
         return _dq_changes(rows)
     changes: dict[tuple, Rows] = {("angle", ""): rows.change(theta=-rows.theta), ("sign", "i"): rows.change(i=-rows.i)}
     for name, order in ORDERS.items():
-        changes["currents", name] = rows.change(i=rows.i[..., order])
+        changes["currents", name] = rows.with_currents(rows.i[..., order])
         changes["duties", name] = rows.change(d=rows.d[..., order])
         if name != "b and c":
-            changes["both", name] = rows.change(i=rows.i[..., order], d=rows.d[..., order])
-    derived = bool(np.max(np.abs(rows.i.sum(axis=-1))) < EXACT * np.max(np.abs(rows.i)))
-    for phase in range(2 if derived else 3):
-        changes["sign", CURRENTS[phase]] = rows.change(i=_negated(rows.i, phase, derived))
+            changes["both", name] = rows.with_currents(rows.i[..., order]).change(d=rows.d[..., order])
+    for phase in range(3 if rows.third else 2):
+        sign = np.where(np.arange(3) == phase, -1.0, 1.0)
+        changes["sign", CURRENTS[phase]] = rows.with_currents(rows.i * sign)
     return changes
-
-
-def _negated(i, phase, derived) -> Real:
-    """Phase currents (..., 3) with one of the opposite sign; derived: the third is computed from the other two."""
-    i = i * np.where(np.arange(3) == phase, -1.0, 1.0)
-    if derived:
-        i[..., 2] = -i[..., 0] - i[..., 1]
-    return i
 
 
 def _dq_changes(rows: SteadyRows) -> dict[tuple, Rows]:
@@ -108,6 +106,7 @@ def _dq_changes(rows: SteadyRows) -> dict[tuple, Rows]:
         ("sign", "u_d_ref u_q_ref"): rows.change(u_dq=-u),
         ("sign", "i_d u_d_ref"): rows.change(dq=-np.conj(i), u_dq=-np.conj(u)),
         ("sign", "u_q_ref"): rows.change(u_dq=np.conj(u)),
+        ("exchanged", "i_q u_q_ref"): rows.change(dq=i.real + 1j * u.imag, u_dq=u.real + 1j * i[0].imag),
     }
     if np.percentile(np.abs(i.real), 75) > D_CURRENT * rows.machine.rated_current_a:
         changes["sign", "i_d"] = rows.change(dq=-np.conj(i))
@@ -130,6 +129,8 @@ def _words(change) -> str:
     names = which.split()
     if what == "axes":
         return "the d and q axes are swapped" if len(names) == 4 else f"{' and '.join(names)} are swapped"
+    if what == "exchanged":
+        return f"{' and '.join(names)} are swapped"
     if what == "sign":
         if which == "i":
             return "the phase currents have the opposite sign"
@@ -161,24 +162,32 @@ def _apply(recording, change, period) -> None:
             columns["omega_e"] = -columns["omega_e"]
             if "torque" in columns:
                 columns["torque"] = -columns["torque"]
+    elif what == "exchanged":
+        a, b = which.split()
+        columns[a], columns[b] = columns[b], columns[a]
     elif what == "axes":
         for a, b in zip(*[iter(_with_references(which))] * 2, strict=True):
             if recording.has(a, b):
                 columns[a], columns[b] = columns[b], columns[a]
     elif what == "sign":
-        third = columns.get("i_c") if which in CURRENTS[:2] else None
-        derived = third is not None and np.allclose(columns["i_a"] + columns["i_b"], -third, 0.0, EXACT * np.ptp(third))
-        for name in (*CURRENTS, "i_d", "i_q") if which == "i" else _with_references(which):
-            if name in columns:
-                columns[name] = -columns[name]
-        if derived:
-            columns["i_c"] = -columns["i_a"] - columns["i_b"]
+        _negate(columns, which)
     else:
         if "i_c" not in columns and what != "duties":
             columns["i_c"] = -columns["i_a"] - columns["i_b"]
         for names in (CURRENTS, DUTIES) if what == "both" else (CURRENTS,) if what == "currents" else (DUTIES,):
             values = [columns[names[k]] for k in ORDERS[which]]
             columns.update(zip(names, values, strict=True))
+
+
+def _negate(columns, which) -> None:
+    """Reverse the sign of columns in place; a third current that follows from the other two follows them."""
+    third = columns.get("i_c") if which in CURRENTS[:2] else None
+    derived = third is not None and np.allclose(columns["i_a"] + columns["i_b"], -third, 0.0, EXACT * np.ptp(third))
+    for name in (*CURRENTS, "i_d", "i_q") if which == "i" else _with_references(which):
+        if name in columns:
+            columns[name] = -columns[name]
+    if derived:
+        columns["i_c"] = -columns["i_a"] - columns["i_b"]
 
 
 def _with_references(which) -> list[str]:

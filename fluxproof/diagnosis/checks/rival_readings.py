@@ -14,6 +14,8 @@ from fluxproof.diagnosis.checks.balance import Rows, SteadyRows, misfit
 from fluxproof.diagnosis.conventions.reading import Reading
 from fluxproof.diagnosis.conventions.table import readings_for
 
+TURNS = np.radians(np.arange(-60.0, 61.0, 5.0))  # by which the angle of a drive may be off
+FINE = np.radians(np.arange(-4.0, 5.0))
 CLEAR = 1.6  # least ratio of the misfits of the second best and the best hypothesis
 
 
@@ -38,3 +40,17 @@ def misfit_of(rows: Rows, at_current: bool = False) -> float:
     if rows.steady:
         tried += [misfit(rows, at_current=True), misfit(rows, at_d_current=True)]
     return max(tried) if np.isfinite(tried).all() else np.inf
+
+
+def turned_misfit(rows: Rows) -> float:
+    """The least misfit with an angle that is off by up to TURNS, as one point hardly tells from other changes."""
+    coarse = min(TURNS, key=lambda turn: misfit(turned(rows, turn)))
+    return min(misfit(turned(rows, turn)) for turn in coarse + FINE)
+
+
+def turned(rows: Rows, turn: float) -> Rows:
+    """The rows with an angle that was recorded ``turn`` [rad] ahead."""
+    if isinstance(rows, SteadyRows):
+        z = np.exp(1j * turn)
+        return rows.change(dq=rows.dq * z, u_dq=rows.u_dq * z)
+    return rows.change(theta=rows.theta - turn)

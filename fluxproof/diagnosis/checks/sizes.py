@@ -17,11 +17,12 @@ MUCH = 20.0  # times the rated value: more than any overload
 PLAUSIBLE = 4.0  # times the rated value, after the conversion
 ROUNDING = 0.005
 LARGEST_INDEX = 1.3  # 4 / pi, of the six-step operation, relative to half the bus voltage
+AXES = (("i_q", "u_q_ref"), ("i_d", "u_d_ref"))
 CURRENTS = ("i_a", "i_b", "i_c", "i_d", "i_q", "i_d_ref", "i_q_ref")
 
 
 def check(recording, nominal) -> None:
-    _currents(recording, nominal.machine.rated_current_a)
+    _currents(recording, nominal.machine)
     _duties(recording)
     _bus(recording, nominal.inverter.dc_bus_v)
     _voltages(recording, nominal)
@@ -72,11 +73,18 @@ def _winding(recording) -> None:
     del recording.columns["temp_winding"]
 
 
-def _currents(recording, rated) -> None:
+def _currents(recording, machine) -> None:
+    rated = machine.rated_current_a
     large = {
         name: size for name in CURRENTS if name in recording.columns and (size := _size(recording[name])) > MUCH * rated
     }
     if not large:
+        return
+    exchanged = next((pair for pair in AXES if pair[0] in large and _is_exchanged(recording, pair, machine)), None)
+    if exchanged:
+        current, voltage = exchanged
+        message = f"reaches {large[current]:.4g} A and {voltage} {_size(recording[voltage]):.3g} V: they look swapped"
+        _refuse(recording, current, f"{message}; exchange their names in [columns]")
         return
     if max(large.values()) / 1000.0 <= PLAUSIBLE * rated and not _documented(recording, *large):
         # A unit applies to a sensor board: to all currents of a frame, unless the others differ in magnitude.
@@ -85,6 +93,16 @@ def _currents(recording, rated) -> None:
     name = max(large, key=large.__getitem__)
     times = f"{large[name] / rated:.0f} times rated_current_a = {rated:g} A"
     _refuse(recording, name, f"reaches {large[name]:.4g} A, {times}", large)
+
+
+def _is_exchanged(recording, pair, machine) -> bool:
+    """Whether a current is as large as the voltage that the speed needs, and its voltage no larger than a current."""
+    current, voltage = pair
+    if not recording.has(*pair, "omega_e"):
+        return False
+    needed = _size(recording["omega_e"]) * machine.magnet_flux_wb
+    as_voltage = needed / PLAUSIBLE < _size(recording[current]) < needed * PLAUSIBLE
+    return as_voltage and _size(recording[voltage]) < min(PLAUSIBLE * machine.rated_current_a, needed / PLAUSIBLE)
 
 
 def _duties(recording) -> None:

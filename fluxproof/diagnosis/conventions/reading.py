@@ -31,6 +31,7 @@ class Reading:
     machine: dict = field(default_factory=dict)
     pole_pairs: int = 0
     speed: float = 1.0
+    unit: bool = False  # a factor that only a wrong unit has: none where the unit of the column is documented
     dq: bool | None = None  # whether it is of logs in dq, of logs of phases and duties, or of both
 
     def possible(self, recordings) -> bool:
@@ -40,7 +41,11 @@ class Reading:
             return False
         if self.bus != 1.0 and not all(r.has("u_dc") for r in recordings):
             return False
-        if self.turn and not (logs_dq or all(r.has("theta_e") for r in recordings)):
+        # An axis that is turned into one of which no voltage is known would leave the balance.
+        needed = ("u_d_ref", "u_q_ref") if logs_dq else ("theta_e",)
+        if self.turn and not all(r.has(*needed) for r in recordings):
+            return False
+        if self.unit and any(set(self.columns()) & set(r.meta.get("documented_units", ())) for r in recordings):
             return False
         if self.pole_pairs and not all(r.slow and "omega_e" in r.meta.get("of_shaft", ()) for r in recordings):
             return False

@@ -37,6 +37,7 @@ def _angle(degrees, meaning):
 READINGS = (
     # the drive file
     _machine("machine_line_rl", (*R, *L), 2.0, "R, L_d and L_q are line-to-line values, twice the phase values"),
+    _machine("machine_half_rl", (*R, *L), 0.5, "R, L_d and L_q are half the phase values"),
     _machine("resistance_line", R, 2.0, "the resistance is a line-to-line value, twice the phase value"),
     _machine("inductances_line", L, 2.0, "L_d and L_q are line-to-line values, twice the phase values"),
     _machine("psi_line", PSI, ROOT3, "the magnet flux is a line-to-line value, 1.7321 of the phase value"),
@@ -57,8 +58,10 @@ READINGS = (
     _machine("resistance_milli", R, 1e3, "the resistance is in milliohm"),
     # scales of recorded columns
     Reading("currents_rms", "i", "the currents are rms values, 0.7071 of the peak values", currents=ROOT2),
-    Reading("currents_double", "i", "the recorded currents are twice the true ones (peak to peak)", currents=0.5),
-    Reading("currents_half", "i", "the recorded currents are half the true ones", currents=2.0),
+    Reading(
+        "currents_double", "i", "the recorded currents are twice the true ones (peak to peak)", currents=0.5, unit=True,
+    ),
+    Reading("currents_half", "i", "the recorded currents are half the true ones", currents=2.0, unit=True),
     Reading(
         "currents_power_invariant", "i_d, i_q", "the dq currents are power-invariant, 1.2247 of the peak values",
         currents=1 / POWER, dq=True,
@@ -77,9 +80,13 @@ READINGS = (
         "voltages_rms", "u_d_ref, u_q_ref", "the voltages are rms values, 0.7071 of the peak values", voltages=ROOT2,
         dq=True,
     ),
-    Reading("voltages_half", "u_d_ref, u_q_ref", "the recorded voltages are half the true ones", voltages=2.0, dq=True),
+    Reading(
+        "voltages_half", "u_d_ref, u_q_ref", "the recorded voltages are half the true ones", voltages=2.0, dq=True,
+        unit=True,
+    ),
     Reading(
         "voltages_double", "u_d_ref, u_q_ref", "the recorded voltages are twice the true ones", voltages=0.5, dq=True,
+        unit=True,
     ),
     Reading(
         "voltages_line", "u_d_ref, u_q_ref", "the voltages are line-to-line values, 1.7321 of the phase values",
@@ -93,8 +100,8 @@ READINGS = (
         "voltages_power_invariant", "u_d_ref, u_q_ref",
         "the dq voltages are power-invariant, 1.2247 of the peak values", voltages=1 / POWER, dq=True,
     ),
-    Reading("bus_half", "u_dc", "the recorded bus voltage is half the true one", bus=2.0, dq=False),
-    Reading("bus_double", "u_dc", "the recorded bus voltage is twice the true one", bus=0.5, dq=False),
+    Reading("bus_half", "u_dc", "the recorded bus voltage is half the true one", bus=2.0, dq=False, unit=True),
+    Reading("bus_double", "u_dc", "the recorded bus voltage is twice the true one", bus=0.5, dq=False, unit=True),
     # the angle
     _angle(90, ": it is the angle of the q axis"),
     _angle(-90, ": its d axis is the q axis of the model"),

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fluxproof.diagnosis.effects.drive_file import relative
+from fluxproof.diagnosis.effects.drive_file import Restates, relative, restated
 from fluxproof.diagnosis.ground.plant_section import in_addition
 from fluxproof.diagnosis.ground.result import Estimate, NamedEffect
 from fluxproof.diagnosis.inference.fitted_set import covariance_of
@@ -32,20 +32,35 @@ def named_effects(names, posterior, explains, only=None) -> list[NamedEffect]:
     effects, nominal = posterior.setup.effects, best.problem.view.nominal
     out = []
     fewer, absent = without_possible(names, best)
+    given = nominal
     for name in sorted(names.named if only is None else only):
         effect, c = effects[name], best.c[name]
+        nominal = given if isinstance(effect, Restates) else restated(effects, best.c, given)
         simpler = fewer.c.get(name, c)
         c = {key: (1.0 - absent) * v + absent * simpler.get(key, 0.0) for key, v in c.items()}
         estimates = effect.estimates(c, covariance_of(best, name, best.cov), nominal)
         estimates = _with_absence(estimates, effect, (best.c[name], simpler), absent, nominal)
-        estimates = _with_other_sets(estimates, name, names.fits, effect, nominal)
+        estimates = _with_other_sets(estimates, name, names.fits)
         share = relative(effect, {n: best.c[n] for n in best.names}, nominal)
         if share != 1.0:
             estimates = {key: _shared(e, share) for key, e in estimates.items()}
         plant = in_addition(effect.plant({key: share * v for key, v in c.items()}, nominal), nominal)
         confidence = names.named.get(name, 0.0)
         out.append(NamedEffect(name, float(min(confidence, 0.999)), estimates, explains.get(name, 0.0), plant))
-    return out
+    own = {key for e in out if not isinstance(effects[e.name], Restates) for key in e.plant}
+    return [_without(e, own) if isinstance(effects[e.name], Restates) else e for e in out]
+
+
+def _without(effect: NamedEffect, keys) -> NamedEffect:
+    """An effect without the keys of the plant that others state in full."""
+    return replace(effect, plant={key: value for key, value in effect.plant.items() if key not in keys})
+
+
+def estimates_in(fit, name) -> dict[str, Estimate]:
+    """Parameters of an effect as a set of effects has them."""
+    effects, nominal = fit.problem.setup.effects, fit.problem.view.nominal
+    given = nominal if isinstance(effects[name], Restates) else restated(effects, fit.c, nominal)
+    return effects[name].estimates(fit.c[name], covariance_of(fit, name, fit.cov), given)
 
 
 def _with_absence(estimates, effect, ends, absent, nominal) -> dict[str, Estimate]:
@@ -62,13 +77,13 @@ def _with_absence(estimates, effect, ends, absent, nominal) -> dict[str, Estimat
     return out
 
 
-def _with_other_sets(estimates, name, fits, effect, nominal) -> dict[str, Estimate]:
+def _with_other_sets(estimates, name, fits) -> dict[str, Estimate]:
     """Estimates with the spread over the sets that share the posterior's mass."""
     total, out = sum(p for p, _ in fits), dict(estimates)
     for p, fit in fits[1:]:
         if name not in fit.names:
             continue
-        other = effect.estimates(fit.c[name], covariance_of(fit, name, fit.cov), nominal)
+        other = estimates_in(fit, name)
         for key, e in out.items():
             if key in other:
                 sigma = float(np.sqrt(e.sigma**2 + p / total * (other[key].value - e.value) ** 2))

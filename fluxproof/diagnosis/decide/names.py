@@ -7,11 +7,17 @@ credibility in them (credibility.py).
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from fluxproof.diagnosis.decide.ambiguity import ambiguities
 from fluxproof.diagnosis.decide.credibility import credibilities
+from fluxproof.diagnosis.decide.estimates import estimates_in
 from fluxproof.diagnosis.ground import constants as k
+
+SURE = 3.0  # standard deviations
 
 
 @dataclass(frozen=True)
@@ -59,10 +65,33 @@ def names_of(posterior) -> Names:
     sure = {n: p for n, p in present.items() if p >= 1.0 - k.DOUBTED and n in best.names}
     named = {n: p for n, p in sure.items() if effects[n].named}
     suspects = {n: p for n, p in sure.items() if not effects[n].named}
-    groups = ambiguities(kept, present, sure, effects)
+    groups = tuple(_with_what_depends(g, named, kept) for g in ambiguities(kept, present, sure, effects))
+    named = {n: p for n, p in named.items() if not any(n in g for g in groups)}
     grouped = {n for g in groups for n in g}
     possible = {n: p for n, p in present.items() if n not in sure and n not in grouped and p >= k.PRESENT}
     return Names(named, groups, possible, suspects, tuple(kept))
+
+
+def _with_what_depends(group, named, kept) -> tuple[str, ...]:
+    """A group with the names whose sizes depend on which of its effects is there: a part of them is not known.
+
+    A resistance beside a factor on all currents, or on all constants of the drive file, is 75 or 150 mOhm.
+    """
+    members = [next((fit for _, fit in kept if n in fit.names), None) for n in group]
+    fits = [fit for fit in members if fit is not None]
+    return tuple(sorted({*group, *(n for n in named if _depends(n, fits))}))
+
+
+def _depends(name, fits) -> bool:
+    """Whether a size of an effect differs between sets by more than their errors and the share ``DEPENDS`` of it."""
+    sizes = [estimates_in(fit, name) for fit in fits if name in fit.names]
+    for first, second in itertools.combinations(sizes, 2):
+        for key in first.keys() & second.keys():
+            a, b = first[key], second[key]
+            apart = abs(a.value - b.value)
+            if apart > max(k.DEPENDS * max(abs(a.value), abs(b.value)), SURE * np.hypot(a.sigma, b.sigma)):
+                return True
+    return False
 
 
 def _mass(posterior) -> list:

@@ -9,6 +9,7 @@ MeasurementError             an error of the data, which is corrected there (cor
 Drift                        a slow change during the recording
 LegLoss, ShaftTorque         acts at the legs of the inverter; at the shaft
 Described, Relative, Caveat  may be in the drive file already; is relative to another effect; leaves something open
+Restates                     changes constants of the drive file to which other effects are added
 FarStart, Chosen, Spread     far from linear; columns chosen by the recording; in every drive of a fleet
 """
 
@@ -25,7 +26,7 @@ from fluxproof.diagnosis.effects.columns import (
 )
 from fluxproof.diagnosis.effects.constant import Constant
 from fluxproof.diagnosis.effects.course import Drift
-from fluxproof.diagnosis.effects.drive_file import Caveat, Described, Relative
+from fluxproof.diagnosis.effects.drive_file import Caveat, Described, Relative, Restates
 from fluxproof.diagnosis.effects.effect import NEEDS, Effect, Orders
 from fluxproof.diagnosis.effects.estimate import DOUBT, Parameter, believable, one, plausible_range, sigma
 from fluxproof.diagnosis.effects.flux_effect import LEAST_CURRENT, BentFlux, FluxEffect, LostFlux
@@ -56,6 +57,7 @@ __all__ = [
     "Orders",
     "Parameter",
     "Relative",
+    "Restates",
     "ShaftTorque",
     "Spread",
     "Wave",

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from fluxproof.diagnosis.effects.effect import Effect
 
+UNITS = ("_ohm", "_h", "_wb")  # of the keys of [machine]
 LEAST_LEFT = 0.1  # of a parameter of the machine: a smaller one is not this machine
 
 
@@ -31,3 +32,8 @@ def is_exact(effect) -> bool:
 def rescaled(effect) -> frozenset[str]:
     """Signals and keys of [machine] that an effect scales or offsets."""
     return frozenset(effect.rescales) if isinstance(effect, Constant) else frozenset()
+
+
+def is_of_nameplate(effect) -> bool:
+    """Whether an effect is a wrong constant of the machine, each by itself."""
+    return isinstance(effect, Constant) and len(effect.rescales) == 1 and effect.rescales[0].endswith(UNITS)

@@ -22,7 +22,7 @@ def with_flux(view, effects, c, **changed):
     """The view with the flux that magnetic effects of coefficients c add and that others, such as iron, remove."""
     magnetic = [n for n in sorted(c) if isinstance(effects[n], FluxEffect)]
     psi = sum((effects[n].psi(view, c[n]) for n in magnetic), np.zeros_like(view.i))
-    more = np.array([effects[n].delta_l(c[n]) for n in magnetic] or [(0.0, 0.0)]).sum(axis=0)
+    more = np.array([effects[n].inductances(c[n], view.machine) for n in magnetic] or [(0.0, 0.0)]).sum(axis=0)
     least = -0.7 * np.array([view.machine.inductance_d_h, view.machine.inductance_q_h])
     view = view.replace(psi_extra=psi, delta_l=tuple(np.maximum(more, least)), **changed)
     lost = [effects[n].lost_flux(view, c[n]) for n in sorted(c) if isinstance(effects[n], LostFlux)]

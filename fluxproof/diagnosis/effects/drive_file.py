@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from fluxproof.diagnosis.effects.columns import Column
 from fluxproof.diagnosis.effects.effect import Effect
 
@@ -23,6 +25,14 @@ class Relative(Effect):
         raise NotImplementedError
 
 
+class Restates(Effect):
+    """An effect that changes constants of the drive file to which the sizes of other effects are added."""
+
+    def of(self, nominal, c: dict) -> dict[str, float]:
+        """{key of [machine]: its value with coefficients c}."""
+        raise NotImplementedError
+
+
 class Caveat(Effect):
     """An effect whose estimates leave something open in some recordings."""
 
@@ -34,6 +44,15 @@ class Caveat(Effect):
 def relative(effect, c: dict[str, dict], nominal) -> float:
     """Factor on the coefficients of any effect."""
     return effect.relative(c, nominal) if isinstance(effect, Relative) else 1.0
+
+
+def restated(effects, c: dict[str, dict], nominal):
+    """The drive to which the sizes of effects that restate nothing are added; c: {effect: coefficients}."""
+    for name, own in c.items():
+        if isinstance(effects[name], Restates):
+            machine = replace(nominal.machine, **effects[name].of(nominal, own))
+            nominal = replace(nominal, machine=machine)
+    return nominal
 
 
 def caveat(effect, view, c: dict) -> str:

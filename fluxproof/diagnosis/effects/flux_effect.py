@@ -38,6 +38,10 @@ class FluxEffect(FreeCurve):
         """Its contribution to (L_d, L_q) [H]."""
         return 0.0, 0.0
 
+    def inductances(self, c, machine) -> tuple[float, float]:
+        """The same of a machine with these nominal constants."""
+        return self.delta_l(c)
+
 
 class BentFlux(FluxEffect):
     """A flux linkage that is no line of the current: the answer contains it as a flux map."""

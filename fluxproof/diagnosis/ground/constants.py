@@ -54,6 +54,8 @@ MISREAD = 2e-3
 # Log evidence that any effect costs: prior odds of 1 to 19, and the width of its prior.  A convention that cannot gain
 # as much by leaving no effect is not searched.
 ONE_EFFECT = 7.0
+# Odds at which a convention that leaves more than the usual error is preferred to free sizes of the constants.
+CLEARLY = 20.0
 # Least number of operating points: at fewer some convention meets any constant misfit.
 READ_POINTS = 3
 
@@ -66,6 +68,8 @@ LEFT_OUT = 0.05
 OPEN = 0.02
 # Least sum of the probabilities of its effects at which an ambiguity is reported.
 TOGETHER = 0.5
+# Difference of an effect's parameter, relative to it, between alternatives that makes it a part of what is not known.
+DEPENDS = 0.2
 # Least probability at which an effect that is not reported still counts towards the explained share.
 LIKELY = 0.5
 # Discrepancy, in standard deviations of the balance's error, that is accepted without penalty.

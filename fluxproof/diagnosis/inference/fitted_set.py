@@ -76,9 +76,9 @@ def covariance_of(fit: FittedSet, name: str, full: np.ndarray) -> np.ndarray:
     return out
 
 
-def implausible(fit: FittedSet) -> int:
-    """Number of the parameters of a set that are outside of what their effects declare as plausible."""
-    return sum(_implausible(fit, name) for name in fit.names)
+def implausible(fit: FittedSet, name: str | None = None) -> int:
+    """Number of the parameters of a set, or of one effect of it, beyond what their effects declare as plausible."""
+    return sum(_implausible(fit, n) for n in fit.names if name in (None, n))
 
 
 def _implausible(fit, name) -> int:

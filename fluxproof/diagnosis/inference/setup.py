@@ -16,6 +16,8 @@ from fluxproof.diagnosis.inference.linearise import Rows, at_once
 from fluxproof.diagnosis.inference.model import Prior
 from fluxproof.diagnosis.inference.points import Grouping, balance_level, visits
 
+RESOLVED = 1e-6  # of the error of the balance: least noise of a row
+
 
 class Setup:
     """What all problems of a recording share: its rows, the error of their balance, operating points.
@@ -37,9 +39,11 @@ class Setup:
     def _share(self, rows, call):
         self.rows, self.call = rows, call
         self.view, self.effects, self.projector, self.load = rows.view, rows.effects, rows.projector, rows.load
-        self.train, self.cells, self.noise = rows.train, rows.cells, _bounded_noise(rows)
+        self.train, self.cells = rows.train, rows.cells
         self.smooth_rows = rows.smooth_rows
         self.level = balance_level(self.view, self.cells)
+        # An axis without voltage and current, as at a locked rotor, leaves nothing, and would weigh without limit.
+        self.noise = np.maximum(_bounded_noise(rows), RESOLVED * self.level)
         self.common = _common_error(self)
         self.points = point_numbers(self.view, k.POINT)
         self.visits = visits(self.view, self.points)

@@ -22,6 +22,7 @@ from fluxproof.diagnosis.conventions.reading import Reading
 from fluxproof.diagnosis.conventions.table import pole_pairs_for, readings_for
 from fluxproof.diagnosis.decide.interpretation import is_exact, is_simpler
 from fluxproof.diagnosis.effects import torque_of
+from fluxproof.diagnosis.effects.constant import is_of_nameplate
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.machine import flux_terms
 from fluxproof.diagnosis.inference.evidence import evidence
@@ -35,6 +36,7 @@ from fluxproof.diagnosis.inference.setup import Setup
 
 WIDE = 6  # readings to which a second one is added
 SEARCHED = 2  # readings, or pairs of them, that are judged with the whole search
+NOTHING = 1e-7  # of the misfit: no recording is as exact, so that a reading that leaves less has lost its rows
 SAME = 1e-6  # of the balance: readings that leave the same
 KEYS = ("resistance_ohm", "inductance_d_h", "inductance_q_h", "magnet_flux_wb")
 
@@ -65,7 +67,9 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
     terms = Terms(setup)
     perfect = terms.perfect()
     plain = terms.judged(())
+    free = max(map(_of_any_nameplate, posterior.fits.values())) + np.log(k.CLEARLY)
     good = sorted((j for j in map(terms.judged, ((r,) for r in able)) if j.value > plain.value), key=_rank)
+    good = [j for j in good if np.linalg.norm(j.y) > NOTHING * np.linalg.norm(plain.y)]
     two = [terms.judged((*j.readings, r)) for j in good[:WIDE] for r in able if _apart(j.readings, r)]
     singles = {j.readings[0].code: j.value for j in good}
     two = [j for j in two if j.value > max(singles.get(r.code, plain.value) for r in j.readings)]
@@ -81,14 +85,41 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
         value = other.best().value + prior + terms.jacobian(j.readings)
         left = other.best().names
         met = is_exact(j.readings, left, setup.effects) and is_simpler(j.readings, left, most, absurd)
+        # What is left beside one of several readings must have one size under all of them.
+        met = met and all(is_exact((r,), left, setup.effects) for r in _rivals(j, good))
+        # An exact factor is one point of what free sizes cover: what meets it within no error is no such point.
+        met = met and (value > free or _is_clean(other.best()))
         if value > known and met:
             best, known, found = j, value, other
         if best is j and not other.best().names:
             break  # nothing is left that another reading could explain
     if best is None:
         return (), [], posterior
-    rivals = [j.readings[0] for j in good if j.readings != best.readings and len(best.readings) == 1 and _same(j, best)]
-    return best.readings, rivals, found
+    return best.readings, _rivals(best, good), found
+
+
+def _of_any_nameplate(fit) -> float:
+    """The log posterior of a set in which any size of the nameplate's constants is as probable as a small one.
+
+    A drive file is written by hand: beside a factor that happens to be exact, other constants are no absurd error.
+    """
+    effects, value = fit.problem.setup.effects, fit.value
+    for name, size in zip(fit.names, fit.sizes, strict=True):
+        if is_of_nameplate(effects[name]):
+            value += np.log1p(size**2 / fit.problem.most[name]) - np.log(k.IMPLAUSIBLE) * implausible(fit, name)
+    return float(value)
+
+
+def _is_clean(fit) -> bool:
+    """Whether a set leaves a mean voltage of the usual error: only then is a factor met exactly."""
+    mean = [channel == "u" and not order and not contrast for channel, order, contrast in fit.problem.p.groups]
+    return bool((fit.lam[np.array(mean)] <= k.DISCREPANCY).all())
+
+
+def _rivals(judged, good) -> list[Reading]:
+    """The readings that leave the same balance as a single one; good: all that are better than what is documented."""
+    alone = len(judged.readings) == 1
+    return [j.readings[0] for j in good if alone and j.readings != judged.readings and _same(j, judged)]
 
 
 def _read(setup, codes) -> Setup:

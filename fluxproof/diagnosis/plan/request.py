@@ -23,6 +23,7 @@ MOST_REQUESTS = 3
 # Share of D^2 that is given up to avoid an axis without current so far, whose parameters are unknown, and to avoid
 # full speed and rated current, since unmodelled effects grow with both.
 NEW_AXIS, STRAIN = 0.2, 0.2
+SAME_PREDICTION = 1e-3  # of a prediction: what is left of it where two sets of formulas are the same
 
 
 def columns_at(p, view, effect) -> dict:
@@ -109,7 +110,11 @@ def requests(setup, fits, noise_v, cold=False) -> tuple[Planned, ...]:
         columns = {(n, k): column for n in sorted(s.names) for k, column in of[n].items() if column.any()}
         stack = np.array(list(columns.values())).reshape(len(columns), len(p.ok))
         knows.append((stack, known_of(s, columns)))
-    pairs = list(itertools.permutations(range(len(solutions)), 2))
+    formulas = [_formulas(s, of) for s in solutions]
+    seen, pairs = np.isfinite(sigma), list(itertools.permutations(range(len(solutions)), 2))
+    pairs = [(a, b) for a, b in pairs if any(_differ(formulas[m], formulas[n], seen) for m, n in ((a, b), (b, a)))]
+    if not pairs:
+        return ()
     rivals = [rivalry(predictions[a], predictions[b], *knows[b], sigma, p.block, len(omega)) for a, b in pairs]
     effort = (omega / np.abs(omega).max()) ** 2 + np.abs(i / view.machine.rated_current_a) ** 2
     chosen = best_points(rivals, MOST_REQUESTS, NEW_AXIS * new_axes(view, i), STRAIN * effort)
@@ -125,6 +130,25 @@ def requests(setup, fits, noise_v, cold=False) -> tuple[Planned, ...]:
         temperature = float(view.machine.temperature_ref_c) if cooled[k] else None
         out.append(Planned(speed, current, names, why, float(drive), temperature))
     return tuple(out)
+
+
+def _formulas(fit, of) -> tuple[np.ndarray, np.ndarray]:
+    """(prediction (r,), columns (k, r)) at the candidates of a set's formulas without their free curves."""
+    used = {(n, key): v for n, c in fit.c.items() for key, v in c.items()
+            if v and key in of[n] and (n, key) not in fit.problem.cells.free}  # fmt: skip
+    rows = len(next(iter(next(iter(of.values())).values())))
+    columns = np.array([of[n][key] for n, key in used]).reshape(len(used), rows)
+    return np.array(list(used.values())) @ columns, columns
+
+
+def _differ(first, second, seen) -> bool:
+    """Whether no size of the second set's formulas predicts what the first predicts at the rows ``seen``.
+
+    A factor on all currents and one on R, L_d and L_q predict the same everywhere: no point separates them.
+    """
+    wanted, columns = first[0][seen], second[1][:, seen].T
+    left = wanted - columns @ np.linalg.lstsq(columns, wanted, rcond=None)[0]
+    return bool(np.linalg.norm(left) > SAME_PREDICTION * np.linalg.norm(wanted))
 
 
 def _difference(p, k, difference, only, most) -> Difference:

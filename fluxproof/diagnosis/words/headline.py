@@ -31,7 +31,7 @@ MOST_LETTERS = 200  # two lines of a terminal or of the report; only what the ch
 
 def headline(answer, effects) -> str:
     """The verdict of an answer as a headline; effects: the catalogue."""
-    variants, beside = _variants(answer, effects), _beside(answer)
+    variants, beside = _variants(answer, effects), f"{_guessed(answer)}{_beside(answer)}"
     most = MOST_LETTERS - len(beside)
     return next((text for text in variants if len(text) <= most), variants[-1]) + beside
 
@@ -41,6 +41,14 @@ def _beside(answer) -> str:
     codes = REASONS if answer.verdict == "bad_recording" else ASSUMED
     found = dict.fromkeys(p.message for p in answer.problems if p.code in codes and not p.fatal)
     return "".join(f" {capital(message)}." for message in list(found)[:MOST_BESIDE])
+
+
+def _guessed(answer) -> str:
+    """The units that only the numbers gave away, as a sentence: the answer rests on them."""
+    found = dict.fromkeys(p.message for p in answer.problems if p.action == "converted")
+    if not found or answer.verdict in ("bad_recording", "digital_mismatch", "no_mismatch"):  # these name it themselves
+        return ""
+    return f" By its numbers, {joined(list(found))}."
 
 
 def _variants(answer, effects) -> list[str]:
