@@ -195,7 +195,7 @@ def test_a_full_disk_stops_the_run_and_leaves_nothing_half(fleet, tmp_path, monk
 
 
 def test_a_defect_of_the_tool_costs_one_row(fleet, monkeypatch):
-    monkeypatch.setattr("fluxproof.fleet.work.diagnose", lambda *_: {}["no such key"])
+    monkeypatch.setattr("fluxproof.fleet.work.diagnosed", lambda *_: {}["no such key"])
     first = listed(fleet[0])[0]
     result = work(item_of(first))
     assert result.row["verdict"] == "bad_recording" and "KeyError" in result.row["reason"] and result.lasting
@@ -203,7 +203,7 @@ def test_a_defect_of_the_tool_costs_one_row(fleet, monkeypatch):
     def lost(*_):
         raise MemoryError("no memory")
 
-    monkeypatch.setattr("fluxproof.fleet.work.diagnose", lost)
+    monkeypatch.setattr("fluxproof.fleet.work.diagnosed", lost)
     assert not work(item_of(first)).lasting  # another machine may have it
 
 

@@ -51,7 +51,7 @@ def step(state, enable, sample_valid, m_axis_tready, *values):
     raw, shown = values[: len(INPUTS)], values[len(INPUTS) : len(INPUTS) + len(SHOWN)]
 
     taken = sample_valid and s.age == INTERVAL
-    sample = sample_latch.step.py_func(*raw) if taken else s.sample
+    sample = sample_latch.step.py_func(sample_latch.Inputs(*raw)) if taken else s.sample
     age = 1 if taken else min(s.age + 1, INTERVAL)
     counter = (s.counter + 1) & ((1 << number_w) - 1) if taken else s.counter
 

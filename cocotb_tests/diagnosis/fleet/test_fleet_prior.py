@@ -88,7 +88,7 @@ def test_the_odds_of_a_name_are_at_most_its_bayes_factor(drive, monkeypatch):
     prior = load_prior(population_of(folder, alone, faulty, "faulty.parquet"), folder / "drive.toml")
     odds = lambda: [np.log(0.05 / 0.95) + shift for shift in prior.shifts().values()]  # noqa: E731
     assert max(odds()) <= 1e-9
-    monkeypatch.setattr("fluxproof.diagnosis.fleet.prior.EVEN", 0.999)
+    monkeypatch.setattr("fluxproof.diagnosis.ground.constants.FLEET_EVEN", 0.999)
     assert max(odds()) > 2.0
 
 

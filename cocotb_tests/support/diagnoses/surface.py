@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from fluxproof.diagnosis.effects import Effect, FarStart, MeasurementError
 from fluxproof.diagnosis.inference.fitted_set import FittedSet
 from fluxproof.diagnosis.inference.linearise import linearised
 from fluxproof.diagnosis.inference.problem import Problem
@@ -14,6 +15,13 @@ from fluxproof.diagnosis.inference.search import search
 
 POOR = -1000.0  # log evidence of a set of which the table says nothing
 ERRORS = "ef"  # effects that are measurement errors
+
+
+def _effect(corrects, starts) -> Effect:
+    """An effect that is never impossible; corrects: a measurement error; starts: it is approached from these."""
+    parts = [part for part, mine in ((MeasurementError, corrects), (FarStart, bool(starts))) if mine] or [Effect]
+    possible = {"too_large": lambda self, c, view: False, "possible": lambda self, c, covariance, nominal: True}
+    return object.__new__(type("Lettered", tuple(parts), {"starts": starts, **possible}))
 
 
 class Table:
@@ -27,11 +35,10 @@ class Table:
     def __init__(self, table, effects="abcdefgh", coefficient=lambda x: 1.0, starts=()):
         self.table, self.effects, self.coefficient = {("", ""): 0.0} | table, effects, coefficient
         own = {n: tuple({"x": x} for x in starts) if n == "e" else () for n in effects}
-        possible = {"too_large": lambda c, view: False, "possible": lambda c, covariance, nominal: True}
         self.setup = SimpleNamespace(
             call=self._call,
             rows=None,
-            effects={n: SimpleNamespace(corrects=n in ERRORS, starts=own[n], **possible) for n in effects},
+            effects={n: _effect(n in ERRORS, own[n]) for n in effects},
             view=SimpleNamespace(u=np.ones((1, 3)), to_dq=lambda u: u),  # a voltage of 1 V, all of which is misfit
             cells=SimpleNamespace(channel=np.array(["u"]), order=np.zeros(1), y=np.ones(1)),
         )

@@ -89,18 +89,18 @@ def _first_loads(rows, start):
 def _coefficients(rows, columns, prior, across, weighted, state):
     """Coefficients and their covariance at the sizes of ``state``; the log evidence.
 
-    log p(y) = -1/2 (y' V^-1 y - gain + log|V| + log|M|), M the posterior precision in units of the prior's deviation.
+    log p(y) = -1/2 (r' V^-1 r + z' z + log|V| + log|M|): r is what X c leaves, z is c over the prior's deviation, M the
+    posterior precision in units of that deviation.
     """
     n, k = columns.x.shape
     v = np.zeros(n)
-    power, logdet = 0.0, 0.0
+    logdet = 0.0
     product = 1.0  # a logarithm of many factors at once, before the product leaves the range of a float
     for i in range(n):
         g = rows.group[i]
         v[i] = rows.variance[i] + state.lam[g] ** 2 * state.error2[i] + state.mu[g] ** 2 * state.curve2[i]
         v[i] += state.own[i]
         v[i] += state.loaded[i]
-        power += rows.y[i] * rows.y[i] / v[i]
         product *= v[i]
         if not SMALL < product < LARGE:
             logdet += np.log(product)
@@ -122,7 +122,8 @@ def _coefficients(rows, columns, prior, across, weighted, state):
         for q in range(k):
             m[p, q] = precision[p, q] * deviation[p] * deviation[q]
         m[p, p] += 1.0
-    gain, log_m = 0.0, 0.0
+    log_m, shrunk = 0.0, 0.0
+    left = rows.y.copy()
     if k:
         factor = np.linalg.cholesky(m)
         for p in range(k):
@@ -130,11 +131,18 @@ def _coefficients(rows, columns, prior, across, weighted, state):
         inverse = np.linalg.inv(m)
         z = inverse @ b
         for p in range(k):
-            gain += z[p] * b[p]
+            shrunk += z[p] * z[p]
             state.c[p] = z[p] * deviation[p]
             for q in range(k):
                 state.cov[p, q] = inverse[p, q] * deviation[p] * deviation[q]
-    value = -0.5 * (power - gain + log_m + logdet)
+        for p in range(k):
+            for i in range(n):
+                left[i] -= across[p, i] * state.c[p]
+    # y' V^-1 y less what is explained would be nothing but rounding where nearly all of a huge misfit is explained.
+    power = shrunk
+    for i in range(n):
+        power += left[i] * left[i] / v[i]
+    value = -0.5 * (power + log_m + logdet)
     for g in range(rows.groups):
         value -= np.log(1.0 + (state.lam[g] / prior.typical) ** 2)
     return value

@@ -36,7 +36,7 @@ from fluxproof.diagnosis.inference.setup import Setup
 
 WIDE = 6  # readings to which a second one is added
 SEARCHED = 2  # readings, or pairs of them, that are judged with the whole search
-NOTHING = 1e-7  # of the misfit: no recording is as exact, so that a reading that leaves less has lost its rows
+NOTHING = 1e-6  # of the usual error: no recording is as exact, so that a reading that leaves less has lost its rows
 SAME = 1e-6  # of the balance: readings that leave the same
 KEYS = ("resistance_ohm", "inductance_d_h", "inductance_q_h", "magnet_flux_wb")
 
@@ -69,7 +69,7 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
     plain = terms.judged(())
     free = max(map(_of_any_nameplate, posterior.fits.values())) + np.log(k.CLEARLY)
     good = sorted((j for j in map(terms.judged, ((r,) for r in able)) if j.value > plain.value), key=_rank)
-    good = [j for j in good if np.linalg.norm(j.y) > NOTHING * np.linalg.norm(plain.y)]
+    good = [j for j in good if np.linalg.norm(j.y) > NOTHING * np.linalg.norm(terms.points(0.0)[0].level)]
     two = [terms.judged((*j.readings, r)) for j in good[:WIDE] for r in able if _apart(j.readings, r)]
     singles = {j.readings[0].code: j.value for j in good}
     two = [j for j in two if j.value > max(singles.get(r.code, plain.value) for r in j.readings)]
