@@ -76,6 +76,9 @@ class MachineScale(Alternatives, FluxEffect, Constant, Chosen, Restates):
         form, share = _share(c)
         return {key: (1.0 + share) * getattr(nominal.machine, key) for key in KEYS[form]}
 
+    def twin(self, c):
+        return {"impedance": "current_scale", "all": "udc_gain"}[_share(c)[0]]
+
     def plant(self, c, nominal):
         return {f"machine.{key}": value for key, value in self.of(nominal, c).items()}
 

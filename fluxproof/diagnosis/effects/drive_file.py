@@ -32,6 +32,10 @@ class Restates(Effect):
         """{key of [machine]: its value with coefficients c}."""
         raise NotImplementedError
 
+    def twin(self, c: dict) -> str:
+        """The effect that leaves the same voltages as coefficients c at every operating point."""
+        raise NotImplementedError
+
 
 class Caveat(Effect):
     """An effect whose estimates leave something open in some recordings."""
