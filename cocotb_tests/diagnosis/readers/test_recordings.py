@@ -109,6 +109,17 @@ def test_text_layouts(tmp_path, nominal, separator, decimal, extra):
         np.testing.assert_array_equal(recording[name], values)
 
 
+def test_title_names_and_units_above_the_numbers(tmp_path):
+    """Units that no list holds are units too, where they repeat under names that do not."""
+    head = "2026-05-11 15:22:21\nBus voltage, Current d, Current q, Bus power, Field\nV, A, A, furlong, furlong\n"
+    (tmp_path / "r.csv").write_text(head + "48.1, 0.1, 1.5, 70, 1\n" * 30)
+    table = read_table(tmp_path / "r.csv")
+    assert list(table.columns) == ["Bus voltage", "Current d", "Current q", "Bus power", "Field"]
+    assert [table.units[n] for n in ("Bus voltage", "Current q", "Field")] == ["V", "A", "furlong"]
+    (tmp_path / "two.csv").write_text("left, left, right\nu, i, i2\n" + "48.1, 0.1, 1.5\n" * 30)
+    assert list(read_table(tmp_path / "two.csv").columns) == ["u", "i", "i2"]
+
+
 def test_text_without_header_takes_numbers_as_names(tmp_path):
     table = made(600)
     path = tmp_path / "r.txt"
