@@ -258,8 +258,8 @@ def _worth(missing, names) -> str:
     if not dyno or not any(text.startswith("voltages") for text in missing):
         return ""
     return (
-        ". Torque, current and speed alone (a dyno sheet) are not diagnosed; the control's u_q_ref would add R, flux and "
-        "a scale of the currents, u_d_ref also inductances and the angle"
+        ". Torque, current and speed alone (a dyno sheet) are not diagnosed; the control's u_q_ref would add R, flux "
+        "and a scale of the currents, u_d_ref also inductances and the angle"
     )
 
 
