@@ -29,6 +29,9 @@ COMMANDS = {
     "commission": Command(
         "fluxproof.commission.command", "measure what a drive file cannot know, over the registers of a board"
     ),
+    "constants": Command(
+        "fluxproof.constants.command", "numbers of a data sheet into [machine], checked against each other"
+    ),
     "diagnose": Command("fluxproof.diagnosis.command", "why a recording differs from its simulation"),
     "dump": Command("fluxproof.dump_capture", "convert a captured telemetry stream to the input of diagnose"),
     "fleet": Command(

@@ -92,13 +92,45 @@ def test_phase_order_against_the_recorded_speed(tmp_path):
     assert found(answer) == {"magnet_flux_wb": pytest.approx(0.97 * PSI, rel=0.002)}
 
 
+def probe(columns, name="u_ab"):
+    """One voltage and nothing else."""
+    lines_of = {"u_ab": columns["u_a"] - columns["u_b"], "u_ca": columns["u_c"] - columns["u_a"]}
+    return {"t": columns["t"], name: lines_of.get(name, columns.get(name))}
+
+
+@pytest.mark.parametrize("name, rate", [("u_ab", 50e3), ("u_ab", 2000.0), ("u_ca", 611.0), ("u_a", 211.0)])
+def test_one_probe_with_few_samples_of_a_turn(tmp_path, name, rate):
+    columns = emf(psi=0.97 * PSI, fifth=0.04, rate=rate, seconds=0.5 if rate > 1e4 else 6.0)
+    answer = answer_of(tmp_path, probe(columns, name))
+    assert {e.name for e in answer.effects} == {"magnet_flux", "emf_harmonics"}
+    assert found(answer)["magnet_flux_wb"] == pytest.approx(0.97 * PSI, rel=0.002)
+    assert found(answer)["order_6"] == pytest.approx(0.97 * 0.04 / 5, rel=0.05)
+    assert any("not recorded are taken to be alike" in note for note in answer.notes)
+
+
+def test_one_probe_that_rests_and_spins_up(tmp_path):
+    rate = 500.0
+    t = np.arange(round(20 * rate)) / rate
+    omega = np.interp(t, [0, 5, 7, 15, 17, 20], [0, 0, 300.0, 300.0, 0, 0])
+    theta = np.cumsum(omega) / rate
+    u = np.sqrt(3) * 0.9 * PSI * omega * np.cos(theta) + 0.02 * np.random.default_rng(4).standard_normal(len(t))
+    answer = answer_of(tmp_path, {"t": t, "u_ab": u})
+    assert found(answer) == {"magnet_flux_wb": pytest.approx(0.9 * PSI, rel=0.003)}
+
+
+def test_one_probe_of_noise_is_refused(tmp_path):
+    t = np.arange(4000) / 500.0
+    with pytest.raises(RecordingError, match="no sine wave|samples of an electrical turn"):
+        answer_of(tmp_path, {"t": t, "u_ab": np.random.default_rng(4).standard_normal(len(t))})
+
+
 def test_refusals_name_the_reason(tmp_path):
     twice = emf(seconds=0.2)
     twice["omega_e"] = 2.0 * twice["omega_e"]
     wrong = answer_of(tmp_path, twice)
     assert wrong.verdict == "bad_recording" and "pole_pairs" in wrong.sentence
     cases = {
-        "samples of an electrical turn": emf(rate=300.0, seconds=2.0),
+        "samples of an electrical turn": emf(rate=140.0, seconds=8.0, speeds=(400.0,)),
         "need a time column": {k: v for k, v in emf(seconds=0.1).items() if k != "t"},
         "without current only": emf(seconds=0.1) | {"i_a": np.full(10000, 3.0)[: 2 * round(0.1 * 50e3)]},
         "whole electrical turn": {k: v[:200] for k, v in emf().items()},

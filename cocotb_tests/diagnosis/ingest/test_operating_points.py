@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.diagnoses.answers import answer_of, found, held, said, without
-from cocotb_tests.support.drives import L_Q, PSI, R
-from cocotb_tests.support.recordings.bench_logs import Truth, table
-from cocotb_tests.support.recordings.from_equations import codes, nominal_of, write
+from cocotb_tests.support.drives import L_D, L_Q, PSI, R
+from cocotb_tests.support.recordings.bench_logs import Truth, table, with_torque
+from cocotb_tests.support.recordings.from_equations import DRIVE, codes, nominal_of, write
+from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.loading.load import load_recording
 
@@ -74,3 +75,51 @@ AREA = [(w, d, q) for w in (250.0, 500.0, -300.0) for d in (-4.0, -2.0, 0.0) for
 
 def test_codes_of_a_table_are_clean(tmp_path):
     assert codes(load_recording(write(tmp_path / "r.csv", table()), nominal_of(tmp_path))) == []
+
+
+LARGER = Truth(r=1.3 * R, l_d=1.3 * L_D, l_q=1.3 * L_Q)
+ALIKE = {"current_scale", "machine_scale"}
+
+
+@pytest.mark.parametrize("truth, scale", [(LARGER, 1.0), (Truth(), 1 / 1.3)])
+def test_a_torque_tells_a_gain_of_the_currents_from_constants_off_by_one_factor(tmp_path, truth, scale):
+    both = with_torque(table(truth), truth, scale=scale)
+    alone = answer_of(tmp_path, {name: x for name, x in both.items() if name != "torque"})
+    assert alone.verdict == "ambiguous" and set(alone.ambiguity[0]) == ALIKE
+    answer = answer_of(tmp_path, both)
+    assert answer.verdict == "explained"
+    assert [e.name for e in answer.effects] == ["machine_scale" if scale == 1.0 else "current_scale"]
+
+
+def test_friction_and_magnets_of_a_table_with_torque(tmp_path):
+    truth = Truth(psi=0.93 * PSI)
+    answer = answer_of(tmp_path, with_torque(table(truth), truth, friction=0.3))
+    values = found(answer)
+    assert {e.name for e in answer.effects} == {"friction", "magnet_flux"}
+    assert values["coulomb_friction_nm"] == pytest.approx(0.3, abs=0.02)
+    assert values["magnet_flux_wb"] == pytest.approx(0.93 * PSI, rel=0.002)
+
+
+def test_a_torque_that_the_drive_computed_is_no_measurement(tmp_path):
+    truth = Truth(psi=0.93 * PSI)
+    columns = table(truth)
+    computed = with_torque(columns, noise_nm=0.0)  # from the currents, with the constants of the drive file
+    answer = answer_of(tmp_path, computed)
+    assert found(answer) == {"magnet_flux_wb": pytest.approx(0.93 * PSI, rel=0.002)}
+    assert [e.name for e in answer_of(tmp_path, columns).effects] == [e.name for e in answer.effects]
+
+
+def test_a_locked_rotor_whose_time_has_too_few_digits(tmp_path):
+    """A date of ten digits of which six were written is the same in every row: the plateaus are points of a table."""
+    rng = np.random.default_rng(4)
+    i_q = np.repeat([1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 4.0, -4.0, 5.0, -5.0], 60)
+    noise = rng.standard_normal((2, len(i_q)))
+    columns = {"t": np.full(len(i_q), 1.74223e9), "i_q": i_q + 0.01 * noise[0], "u_q_ref": 1.3 * R * i_q}
+    columns["u_q_ref"] = columns["u_q_ref"] + 0.02 * noise[1]
+    (tmp_path / "drive.toml").write_text(
+        DRIVE.replace("sample_time_s = 0.0001", "") + "\n[constants]\ni_d = 0\nomega_e = 0\ntheta_e = 0\n"
+    )
+    answer = diagnose(write(tmp_path / "r.csv", columns), tmp_path / "drive.toml")
+    assert found(answer) == {"resistance_ohm": pytest.approx(1.3 * R, rel=0.01)}
+    assert "The file has no time" in answer.sentence
+    assert any("is the same in all rows and tells no time" in note for note in answer.notes)

@@ -253,3 +253,9 @@ def test_a_speed_without_a_unit_is_proposed_with_one(tmp_path, nominal):
     table = {name: np.ones(50) for name in ("i_d", "i_q", "u_d_ref", "u_q_ref", "n")}
     with pytest.raises(RecordingError, match="'n' for omega_e if its unit is stated"):
         load_recording(write(tmp_path / "r.csv", table), nominal)
+
+
+def test_a_dyno_sheet_is_told_what_its_missing_voltages_would_add(tmp_path):
+    (tmp_path / "dyno.csv").write_text("rpm,iq (A),T measured (Nm),bus (A)\n" + "100,1.5,0.2,0.1\n" * 8)
+    with pytest.raises(RecordingError, match=r"dyno sheet\) are not diagnosed; .*u_q_ref would add R, flux"):
+        load_recording(tmp_path / "dyno.csv", nominal_of(tmp_path))

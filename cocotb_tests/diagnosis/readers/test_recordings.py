@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import sys
 import time
 
 import numpy as np
@@ -31,6 +33,37 @@ def test_every_format_comes_back_as_written(tmp_path, nominal, suffix):
     for name, values in table.items():
         np.testing.assert_allclose(recording[name], values, rtol=1e-12, atol=1e-12)
     assert recording.joined[:-1].all() and not recording.joined[-1] and recording.usable.all() and not recording.slow
+
+
+@pytest.mark.parametrize("version", ["v7", "v7.3"])
+def test_matlab_tables_and_timetables(tmp_path, nominal, version):
+    matio = pytest.importorskip("matio", reason="mat-io needs Python 3.11")
+    table = made()
+    rest = {name: values for name, values in table.items() if name != "t"}
+    frame = pd.DataFrame(rest | {"comment": ["a"] * len(table["t"])})
+    frame.attrs["VariableUnits"] = ["mA" if name == "i_a" else "" for name in frame]
+    frame["i_a"] *= 1e3
+    times = pd.to_timedelta(np.round(table["t"] * 1e9), unit="ns")
+    timed = frame.set_index(times).rename_axis("Time").drop(columns="i_a").assign(i_a=table["i_a"])
+    for kind, content in (("table", frame.assign(t=table["t"])), ("timetable", timed)):
+        path = tmp_path / f"{kind}.mat"
+        matio.save_to_mat(str(path), {"run": content, "gain": np.array([2.0])}, version=version)
+        if kind == "table":  # the writer stores no units
+            nominal_or_own = dataclasses.replace(nominal, columns={"i_a": {"name": "i_a", "unit": "mA"}})
+        else:
+            nominal_or_own = nominal
+        recording = load_recording(path, nominal_or_own)
+        for name, values in table.items():
+            np.testing.assert_allclose(recording[name], values, rtol=1e-9, atol=1e-9)
+
+
+def test_a_matlab_table_without_its_library_names_the_remedy(tmp_path, nominal, monkeypatch):
+    matio = pytest.importorskip("matio", reason="mat-io needs Python 3.11")
+    path = tmp_path / "r.mat"
+    matio.save_to_mat(str(path), {"run": pd.DataFrame(made())}, version="v7")
+    monkeypatch.setitem(sys.modules, "matio", None)
+    with pytest.raises(RecordingError, match=r"r\.mat: MATLAB objects need Python 3\.11.*writetable"):
+        load_recording(path, nominal)
 
 
 UNITS = {
@@ -74,6 +107,17 @@ def test_text_layouts(tmp_path, nominal, separator, decimal, extra):
     assert codes(recording) == []
     for name, values in table.items():
         np.testing.assert_array_equal(recording[name], values)
+
+
+def test_title_names_and_units_above_the_numbers(tmp_path):
+    """Units that no list holds are units too, where they repeat under names that do not."""
+    head = "2026-05-11 15:22:21\nBus voltage, Current d, Current q, Bus power, Field\nV, A, A, furlong, furlong\n"
+    (tmp_path / "r.csv").write_text(head + "48.1, 0.1, 1.5, 70, 1\n" * 30)
+    table = read_table(tmp_path / "r.csv")
+    assert list(table.columns) == ["Bus voltage", "Current d", "Current q", "Bus power", "Field"]
+    assert [table.units[n] for n in ("Bus voltage", "Current q", "Field")] == ["V", "A", "furlong"]
+    (tmp_path / "two.csv").write_text("left, left, right\nu, i, i2\n" + "48.1, 0.1, 1.5\n" * 30)
+    assert list(read_table(tmp_path / "two.csv").columns) == ["u", "i", "i2"]
 
 
 def test_text_without_header_takes_numbers_as_names(tmp_path):

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from cocotb_tests.support.recordings.from_equations import dump, made, write, write_mat73
@@ -153,6 +154,13 @@ def pairs(folder, suffix):
         bad = folder / "bad.dump"
         bad.write_bytes(good.read_bytes().replace(b"fluxproof telemetry", b"__import__('os') #x", 1))
         return good, bad
+    if suffix == "table":
+        matio = pytest.importorskip("matio", reason="mat-io needs Python 3.11")
+        good, bad = folder / "good.mat", folder / "bad.mat"
+        matio.save_to_mat(str(good), {"run": pd.DataFrame(made(800))}, version="v7")
+        names = {"__import__('os').abort()": np.arange(800.0), "x": ["@(x) system('touch x')"] * 800}
+        matio.save_to_mat(str(bad), {"abort": pd.DataFrame(names)}, version="v7")
+        return good, bad
     good = good or write(folder / f"good{suffix}", made(800))
     bad = folder / f"bad{suffix if suffix != '7.3' else '.mat'}"
     objects = np.array([Canary(folder / "canary"), 1], dtype=object)
@@ -179,7 +187,7 @@ def pairs(folder, suffix):
     return good, bad
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".npz", ".npy", ".h5", ".mat", "7.3", ".mf4", ".dump"])
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".npz", ".npy", ".h5", ".mat", "7.3", "table", ".mf4", ".dump"])
 def test_reading_runs_nothing(tmp_path, suffix):
     good, bad = pairs(tmp_path, suffix)
     read_table(good)  # libraries are imported when the first file of a format comes
@@ -191,7 +199,9 @@ def test_reading_runs_nothing(tmp_path, suffix):
             except RecordingError:
                 refused.append(path)
         assert not events
-    assert refused == ([] if suffix in (".csv", ".parquet", ".mat") else [bad])  # these contain numbers as well
+    assert refused == (
+        [] if suffix in (".csv", ".parquet", ".mat", "table") else [bad]
+    )  # these contain numbers as well
     assert not (tmp_path / "canary").exists()
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cocotb_tests.support.drives import L_D, L_Q, PSI, R
+from cocotb_tests.support.drives import L_D, L_Q, PAIRS, PSI, R
 
 GRID = [
     (w, d, q)
@@ -60,6 +60,18 @@ def table(truth: Truth = Truth(), points=GRID, noise_v=0.05, noise_a=0.003, repe
         "omega_e": omega,
     }
     return out if theta is None else out | {"theta_e": theta}
+
+
+def with_torque(columns: dict, truth: Truth = Truth(), friction=0.0, scale=1.0, noise_nm=0.003, seed=8) -> dict:
+    """The same table with the torque of a transducer at the shaft [Nm], and currents recorded at ``scale``.
+
+    friction: dry torque against the motion [Nm].
+    """
+    i_d, i_q = columns["i_d"], columns["i_q"]
+    torque = 1.5 * PAIRS * (truth.psi + (truth.l_d - truth.l_q) * i_d) * i_q
+    torque = torque - friction * np.sign(columns["omega_e"])
+    noise = noise_nm * np.random.default_rng(seed).standard_normal(len(torque))
+    return columns | {"i_d": scale * i_d, "i_q": scale * i_q, "torque": torque + noise}
 
 
 def warming(hours=2.0, step_s=2.0, magnets=-0.05, copper=0.0039, rise_k=40.0, i=-1.0 + 4j, omega=400.0, seed=5) -> dict:

@@ -19,6 +19,7 @@ from fluxproof.diagnosis.balance.slow_stretches import (
     known_angle,
     known_voltage,
     operating_columns,
+    torque_at_shaft,
 )
 from fluxproof.diagnosis.ground.machine import steady_voltage
 from fluxproof.diagnosis.ground.nominal import flux_level
@@ -53,9 +54,12 @@ def point_rows(recording, nominal) -> Stretches:
     temp = r["temp_winding"] if r.has("temp_winding") else np.full(len(t), np.nan)
     groups = _groups(t, (omega, nominal_u, u), good, float(t[-1]) / MEANS)
     first, end = np.array([g[0] for g in groups]), np.array([g[-1] + 1 for g in groups])
-    i, u, omega, u_dc, temp, t = (np.array([np.mean(x[g]) for g in groups]) for x in (i, u, omega, u_dc, temp, t))
+    torque = torque_at_shaft(r, nominal, i, omega)
+    i, u, omega, u_dc, temp, t, torque = (
+        np.array([np.mean(x[g]) for g in groups]) for x in (i, u, omega, u_dc, temp, t, torque)
+    )
     unsteady = np.zeros(len(groups))
-    return Stretches(i, u, omega, u_dc, temp, t, first, end, unsteady, rest[first], 0.0, both_axes, notes)
+    return Stretches(i, u, omega, u_dc, temp, t, first, end, unsteady, rest[first], 0.0, both_axes, notes, torque)
 
 
 def block_points(recording, nominal, catalogue: dict | None = None) -> Stretches:

@@ -68,6 +68,11 @@ def shaft_kind(recording, nominal, i_s, theta, linked) -> str:
     return "unloaded" if np.sum((left - fitted) ** 2) < (1 - ODD_SHARE) * np.sum(left**2) else "free"
 
 
+def measures_torque(view) -> bool:
+    """Whether a transducer shows the torque of some block of a view."""
+    return bool(np.isin(view.shaft, MEASURED).any())
+
+
 def airgap(nominal, i):
     """Air-gap torque [Nm] of the nominal machine for dq currents, complex [A]."""
     return airgap_torque(nominal.machine, flux_linkage(nominal.machine, i), i)

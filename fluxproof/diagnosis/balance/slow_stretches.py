@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fluxproof.diagnosis.balance.shaft import airgap, is_airgap
 from fluxproof.diagnosis.ground.arrays import Complex
 from fluxproof.diagnosis.ground.machine import steady_voltage
 from fluxproof.diagnosis.ground.recording import Recording, RecordingError
@@ -37,6 +38,7 @@ GAP = 10.0  # times the usual step
 MESSAGE_ROWS = 3.0  # rows; a signal that changes as often has no messages
 PARTS = 4  # of a stretch without messages
 NOISE = 3.0  # standard deviations: usual range of PARTS means
+COMPUTED = 5e-4  # of the torque: what a measured one differs from the formula at least
 AT_REST = 0.05  # rad within a stretch: the rotor does not turn
 
 
@@ -45,7 +47,8 @@ class Stretches:
     """Means over each stretch, all (b,): dq current and voltage complex [A], [V], electrical speed [rad/s],
     bus [V], winding [degC] or nan, time of the middle since the first row [s], first row and end (exclusive), and the
     change of the voltage from shortly before to shortly after the stretch [V].  rest: angle of a rotor at rest [rad],
-    nan if it turns; both_axes: whether u_d is known, otherwise it is that of the nominal drive."""
+    nan if it turns; both_axes: whether u_d is known, otherwise it is that of the nominal drive; torque: measured at the
+    shaft [Nm], None or nan without a transducer."""
 
     i: Complex
     u: Complex
@@ -60,6 +63,7 @@ class Stretches:
     window_s: float
     both_axes: bool = True
     notes: tuple[str, ...] = ()
+    torque: np.ndarray | None = None
 
     def __len__(self):
         return len(self.t)
@@ -70,6 +74,8 @@ class Stretches:
             return self
         parts = np.array_split(np.arange(len(self)), most)
         names = ("i", "u", "omega", "u_dc", "temp", "t")
+        if self.torque is not None:
+            names = (*names, "torque")
         mean = {name: np.array([getattr(self, name)[k].mean() for k in parts]) for name in names}
         largest = np.array([self.unsteady[k].max() for k in parts])
         begin, last = (np.array([k[edge] for k in parts]) for edge in (0, -1))
@@ -158,8 +164,9 @@ def stretches_of(recording, nominal, least_s) -> Stretches:
     speed = mean(omega)
     rest = np.where(np.abs(speed) * window < AT_REST, angle[first], np.nan)
     return Stretches(
-        mean(i), mean(u), speed, mean(u_dc), mean(temp), mean(t), first, end, unsteady, rest, float(window), both_axes
-    )
+        mean(i), mean(u), speed, mean(u_dc), mean(temp), mean(t), first, end, unsteady, rest, float(window), both_axes,
+        torque=mean(torque_at_shaft(r, nominal, i, omega)),
+    )  # fmt: skip
 
 
 def _unstated(nominal, t) -> str:
@@ -209,6 +216,20 @@ def _drift(x) -> float:
     means = np.array([p.mean() for p in np.array_split(x, parts)])
     noise = np.sqrt(np.mean(np.abs(np.diff(x)) ** 2) / 2.0 * parts / len(x))
     return max(_change(means) - NOISE * float(noise), 0.0)
+
+
+def torque_at_shaft(recording, nominal, i, omega) -> np.ndarray:
+    """(n,) measured torque of a steady drive [Nm], less the drag if the air-gap torque was recorded.
+
+    nan without one, and of one that a drive computed from the currents: no transducer agrees with a formula as closely.
+    """
+    if not recording.has("torque"):
+        return np.full(len(recording), np.nan)
+    torque, nominal_airgap = recording["torque"], airgap(nominal, i)
+    if np.nanmedian(np.abs(torque - nominal_airgap)) <= COMPUTED * np.nanmedian(np.abs(torque)):
+        return np.full(len(recording), np.nan)
+    drag = (nominal.machine.viscous_friction_nms or 0.0) * omega / nominal.machine.pole_pairs
+    return torque - drag if is_airgap(torque, nominal_airgap, drag) else torque
 
 
 def operating_columns(recording: Recording, nominal):

@@ -112,11 +112,13 @@ def view_of_points(found: Stretches, recording, nominal, catalogue: dict | None 
     """The same for given stretches."""
     if alone(found, nominal):  # all that it can show is its drift
         found = found.averaged(MOST_OF_ONE)
+    torque = np.full(len(found), np.nan) if found.torque is None else found.torque
     order, dwell = alike(found, nominal)
     b, period = len(order), nominal.sample_time_s
     span = 0.0 if "time" in recording.lacks else float(recording["t"][-1] - recording["t"][0])
     recording.meta.setdefault("notes", []).extend(found.notes)
-    lacks, course = LACKS | recording.lacks, found.t[order] / max(span, 1e-9)
+    shown = frozenset() if np.isfinite(torque).any() else frozenset({"torque"})
+    lacks, course = LACKS | recording.lacks | shown, found.t[order] / max(span, 1e-9)
     if "time" in lacks and np.ptp(found.temp[order]) > BIN_TEMP_K:  # rows of a table from the coldest to the hottest
         lacks, course = lacks - {"time"}, (found.temp[order] - found.temp.min()) / np.ptp(found.temp)
     held = lambda x, n: np.repeat(np.asarray(x)[order, None], n, axis=1)  # noqa: E731
@@ -140,9 +142,9 @@ def view_of_points(found: Stretches, recording, nominal, catalogue: dict | None 
         t=found.t[order],
         course=course,
         temp=found.temp[order],
-        torque=np.full((b, ROWS), np.nan),
+        torque=held(torque, ROWS),
         slope_m=np.zeros((b, ROWS)),
-        shaft=np.full(b, ""),
+        shaft=np.where(np.isfinite(torque[order]), "torque", ""),
         run=dwell,
         rows=found.first[order],
         span_s=span,

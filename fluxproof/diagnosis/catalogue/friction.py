@@ -87,5 +87,5 @@ EFFECT = Friction(
         Parameter("viscous_friction_nms", "Nm s", "per mechanical rad/s", "viscous"),
         Parameter("coulomb_friction_nm", "Nm", "dry", "dry"),
     ),
-    needs=("harmonics",),
+    needs=("torque",),
 )

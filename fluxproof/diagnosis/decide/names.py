@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fluxproof.diagnosis.balance.shaft import measures_torque
 from fluxproof.diagnosis.decide.ambiguity import ambiguities
 from fluxproof.diagnosis.decide.credibility import credibilities
 from fluxproof.diagnosis.decide.estimates import estimates_in
@@ -67,7 +68,9 @@ def names_of(posterior) -> Names:
     named = {n: p for n, p in sure.items() if effects[n].named}
     suspects = {n: p for n, p in sure.items() if not effects[n].named}
     groups = tuple(_with_what_depends(g, named, kept) for g in ambiguities(kept, present, sure, effects))
-    groups += tuple(_with_its_twin(n, effects[n], best.c[n]) for n in named if _has_a_twin(n, effects, groups))
+    twins = [n for n in named if _has_a_twin(n, effects, groups)]
+    if twins and not measures_torque(posterior.setup.view):  # which a wrong current changes, and a wrong nameplate not
+        groups += tuple(_with_its_twin(n, effects[n], best.c[n]) for n in twins)
     named = {n: p for n, p in named.items() if not any(n in g for g in groups)}
     grouped = {n for g in groups for n in g}
     possible = {n: p for n, p in present.items() if n not in sure and n not in grouped and p >= k.PRESENT}
@@ -75,7 +78,7 @@ def names_of(posterior) -> Names:
 
 
 def _has_a_twin(name, effects, groups) -> bool:
-    """Whether an effect outside of the ambiguities can never be told from another one."""
+    """Whether no voltage balance can tell an effect outside of the ambiguities from another one."""
     return isinstance(effects[name], Restates) and not any(name in g for g in groups)
 
 

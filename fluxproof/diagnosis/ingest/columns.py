@@ -248,7 +248,19 @@ def _demand(plan, names, path) -> None:
         raise RecordingError(
             f"{path}: missing {' and '.join(missing)}; found columns {found or 'none'}{_guesses(missing, names)}; "
             f"name them in [columns] of drive.toml, or give a value that was constant in [constants]{why}"
+            f"{_worth(missing, names)}"
         )
+
+
+def _worth(missing, names) -> str:
+    """What the missing voltages of a dyno sheet would add, as the end of a message; "" for other files."""
+    dyno = any(re.search(r"torque|drehmoment|\bN[ .*]?mm?\b", f"{name} {unit}", re.I) for name, unit in names.items())
+    if not dyno or not any(text.startswith("voltages") for text in missing):
+        return ""
+    return (
+        ". Torque, current and speed alone (a dyno sheet) are not diagnosed; the control's u_q_ref would add R, flux "
+        "and a scale of the currents, u_d_ref also inductances and the angle"
+    )
 
 
 def _not_used(plan, left) -> None:

@@ -2,12 +2,13 @@
 """Which canonical columns a voltage balance requires.
 
 Four kinds of recordings contain enough: currents with commanded voltages, dq values of which u_d may be absent, the
-terminal voltages of a machine that is driven without current (EMF run), and voltage and power of an analyser beside dq
-currents or their references.
+terminal voltages of a machine that is driven without current (EMF run), of which one is enough, and voltage and power
+of an analyser beside dq currents or their references.
 """
 
 from __future__ import annotations
 
+CURRENTS = {"i_a", "i_b", "i_c", "i_d", "i_q"}
 COMMANDED = {"d_a", "d_b", "d_c", "u_d_ref", "u_q_ref"}
 PHASE_VOLTAGES, LINE_VOLTAGES = ("u_a", "u_b", "u_c"), ("u_ab", "u_bc", "u_ca")
 
@@ -18,8 +19,12 @@ def has_terminal_voltages(have) -> bool:
 
 
 def is_emf_run(have) -> bool:
-    """Whether the names ``have`` are those of an EMF run: terminal voltages, and no commanded ones."""
-    return has_terminal_voltages(have) and not COMMANDED & set(have)
+    """Whether the names ``have`` are those of an EMF run: terminal voltages, and no commanded ones.
+
+    One of them is enough where no current was recorded.
+    """
+    one = set(PHASE_VOLTAGES + LINE_VOLTAGES) & set(have) and not CURRENTS & set(have)
+    return bool(has_terminal_voltages(have) or one) and not COMMANDED & set(have)
 
 
 def is_analysed(have) -> bool:

@@ -2,9 +2,10 @@
 """EMF runs: terminal voltages of a driven machine without current (gates off), as rows of a control period.
 
 An oscilloscope or a logger records three voltages against any common point, or two line-to-line voltages, at its own
-rate.  Without current they are the EMF, the derivative of the magnets' flux linkage.  The mean voltage of every control
-period follows from the integral of the samples, so that the balance is the same as for a running drive, with the
-measured voltage in place of duties times bus voltage and a current of zero.
+rate.  Of fewer voltages, or fewer than LEAST_PER_TURN samples of a turn, ingest/emf_probe.py makes three dense ones.
+Without current they are the EMF, the derivative of the magnets' flux linkage.  The mean voltage of every control period
+follows from the integral of the samples, so that the balance is the same as for a running drive, with the measured
+voltage in place of duties times bus voltage and a current of zero.
 
 The angle, if it was not recorded, is that of the fundamental: its phase, averaged over one electrical turn, in which
 harmonics cancel, less what a changing speed adds to that mean.  An angle error cannot be seen then.
@@ -16,10 +17,11 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from fluxproof.diagnosis.ground.recording import Problem, Recording, RecordingError
-from fluxproof.diagnosis.ingest.demand import LINE_VOLTAGES, PHASE_VOLTAGES
+from fluxproof.diagnosis.ingest.demand import LINE_VOLTAGES, PHASE_VOLTAGES, has_terminal_voltages
+from fluxproof.diagnosis.ingest.emf_probe import from_fit, probed
 from fluxproof.plant.transforms import AXES, phase_values, space_vector
 
-LEAST_PER_TURN = 10.0  # samples of an electrical turn
+LEAST_PER_TURN = 10.0  # samples of an electrical turn that are integrated as they are
 GAP = 1.5  # times the usual step of the time
 LEAST_ROWS = 20  # of a stretch
 LEAST_VOLTAGE = 0.05  # of the largest one: at a lower speed the fundamental's phase is noise
@@ -36,15 +38,16 @@ def emf_rows(path, columns: dict, nominal, meta: dict) -> Recording:
     """
     t = _time(path, columns)
     _without_current(path, columns, nominal)
-    v = _space_vector(columns)
-    if not np.isfinite(v).all():
-        row = int(np.argmin(np.isfinite(v)))
-        raise RecordingError(f"{path}: row {row}: the terminal voltages must be numbers")
+    for name in probed(columns):
+        if not np.isfinite(columns[name]).all():
+            row = int(np.argmin(np.isfinite(columns[name])))
+            raise RecordingError(f"{path}: row {row}: the terminal voltage {name} must be a number")
+    recorded, columns = columns, _dense(path, columns)
+    t, v = columns["t"], _space_vector(columns)
     problems = []
     if "theta_e" not in columns:
         v = _turning_as_recorded(v, t, columns, problems)
     period = nominal.sample_time_s
-    _dense_enough(path, v, t)
     parts = [_resampled(t[a:b], v[a:b], period) for a, b in _pieces(t)]
     parts = [part for part in parts if part is not None]
     if not parts:
@@ -58,7 +61,7 @@ def emf_rows(path, columns: dict, nominal, meta: dict) -> Recording:
     joined = np.ones(len(usable), bool)
     joined[np.cumsum(count) - 1] = False
     lacks = LACKS if "theta_e" in columns else LACKS | {"angle"}
-    meta["notes"] += _notes(columns, t, period)
+    meta["notes"] += _notes(recorded, columns is not recorded, period)
     if len(count) > 1:
         meta["run"] = np.repeat(np.arange(len(count)), count)
     return Recording(str(path), arrays, usable, joined, lacks=lacks, problems=problems, meta=meta)
@@ -117,16 +120,18 @@ def _turning_as_recorded(v, t, columns, problems):
     return np.conj(v)
 
 
-def _dense_enough(path, v, t) -> None:
-    step = float(np.median(np.diff(t)))
+def _dense(path, columns) -> dict:
+    """The columns as they are, or with voltages from a fit where a voltage or samples are too few."""
+    if has_terminal_voltages(columns) and _per_turn(_space_vector(columns)) >= LEAST_PER_TURN:
+        return columns
+    return from_fit(path, columns, _pieces(columns["t"]))[0]
+
+
+def _per_turn(v) -> float:
+    """Samples of an electrical turn of the voltage (n,) complex."""
     large = np.abs(v) > 0.5 * np.abs(v).max()
     turned = np.abs(np.angle(v[1:] * np.conj(v[:-1])))[large[1:] & large[:-1]]
-    per_turn = 2 * np.pi / max(float(np.median(turned)) if len(turned) else np.pi, 1e-9)
-    if per_turn < LEAST_PER_TURN:
-        raise RecordingError(
-            f"{path}: {per_turn:.3g} samples of an electrical turn of the terminal voltages, {LEAST_PER_TURN:g} are "
-            f"needed: record more often than every {step:.3g} s, or spin more slowly"
-        )
+    return 2 * np.pi / max(float(np.median(turned)) if len(turned) else np.pi, 1e-9)
 
 
 def _pieces(t):
@@ -228,12 +233,17 @@ def _over_turns(x, turn) -> np.ndarray:
     return np.where((low >= -0.5) & (high <= m - 0.5), mean, np.nan)
 
 
-def _notes(columns, t, period) -> list[str]:
+def _notes(columns, fitted: bool, period) -> list[str]:
+    step = float(np.median(np.diff(columns["t"])))
     notes = [
-        f"EMF run: terminal voltages, a sample every {float(np.median(np.diff(t))):.3g} s, as means over control "
+        f"EMF run: terminal voltages, a sample every {step:.3g} s, as means over control "
         f"periods of {period:g} s; the current is zero, so resistance, inductances, inverter and current sensors "
         "cannot be diagnosed"
     ]
+    if fitted:
+        orders = "the fundamental and orders 5, 7, 11 and 13 are fitted to the samples of several turns"
+        alike = "" if has_terminal_voltages(columns) else "; the phases that were not recorded are taken to be alike"
+        notes.append(f"{orders}{alike}")
     if "theta_e" not in columns:
         notes.append("the angle is that of the fundamental of the voltages: an angle offset cannot be diagnosed")
     if "omega_e" not in columns:

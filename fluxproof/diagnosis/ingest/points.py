@@ -3,6 +3,7 @@
 
 Without a time, rows are consecutive samples of a fast log or points of a table.  A table has no angle and no phase
 quantities that need one, and its rows jump: current or speed change by more than any drive could between two samples.
+A locked rotor without a time or a stated sample time is a table too.
 With a time, rows half a second apart or more are points that were held one after another, unless the log holds values
 until the next message: then voltage and current do not change in the same row.
 """
@@ -28,7 +29,7 @@ def is_table(columns: dict, nominal) -> bool:
     if not {"i_d", "i_q", "omega_e", "u_q_ref"} <= set(columns) or {"d_a", "d_b", "d_c"} <= set(columns):
         return False
     n = len(columns["i_q"])
-    if n < LEAST_ROWS:
+    if n < LEAST_ROWS or _rests_at_no_time(columns, nominal):
         return True
     m, bus = nominal.machine, nominal.inverter.dc_bus_v
     reach = bus * nominal.sample_time_s / min(m.inductance_d_h, m.inductance_q_h)
@@ -36,6 +37,12 @@ def is_table(columns: dict, nominal) -> bool:
     speed = np.abs(np.diff(columns["omega_e"]))
     top = SPEED_STEP * np.nanmax(np.abs(columns["omega_e"]))
     return bool(np.mean((current > max(reach, 0.02 * m.rated_current_a)) | (speed > max(top, 1e-9))) > JUMPS)
+
+
+def _rests_at_no_time(columns, nominal) -> bool:
+    """Whether the rows of a rotor at rest cannot be placed in time, as nothing states how far apart they are."""
+    rests = not np.any(columns["omega_e"]) and np.ptp(columns.get("theta_e", np.zeros(1))) == 0.0
+    return rests and nominal.control.sample_time_s is None
 
 
 def as_table(path, columns: dict, meta: dict, problems) -> Recording:

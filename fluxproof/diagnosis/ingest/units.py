@@ -33,6 +33,10 @@ FACTORS = {
     },
     "A": {
         "A": 1.0,
+        "Amps": 1.0,
+        "amps": 1.0,
+        "Ampere": 1.0,
+        "Amperes": 1.0,
         "mA": 1e-3,
         "kA": 1e3,
         "Arms": PEAK,
@@ -43,6 +47,9 @@ FACTORS = {
     },
     "V": {
         "V": 1.0,
+        "Volt": 1.0,
+        "Volts": 1.0,
+        "volts": 1.0,
         "mV": 1e-3,
         "kV": 1e3,
         "Vrms": PEAK,
@@ -100,7 +107,18 @@ FACTORS = {
         "°F": 5 / 9,
     },
     "W": {"W": 1.0, "kW": 1e3, "MW": 1e6, "mW": 1e-3},
-    "Nm": {"Nm": 1.0, "N m": 1.0, "N*m": 1.0, "N.m": 1.0, "N·m": 1.0, "mNm": 1e-3, "kNm": 1e3},
+    "Nm": {
+        "Nm": 1.0,
+        "N m": 1.0,
+        "N*m": 1.0,
+        "N.m": 1.0,
+        "N·m": 1.0,
+        "mNm": 1e-3,
+        "Nmm": 1e-3,
+        "N.mm": 1e-3,
+        "N mm": 1e-3,
+        "kNm": 1e3,
+    },
 }
 OF_SHAFT = {
     "rad mech",

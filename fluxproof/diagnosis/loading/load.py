@@ -88,6 +88,9 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
     columns = dq_of_analyser(path, columns, nominal, notes)
     if is_emf_run(columns):
         return emf_rows(path, columns, nominal, meta)
+    if "t" in columns and n > 1 and np.ptp(columns["t"]) == 0.0:  # a date with too few digits, an unused counter
+        notes.append(f"column {shown(meta['columns'].get('t', 't'))!r} is the same in all rows and tells no time")
+        del columns["t"]
     timeless = ("t" not in columns or n == 1) and not table.meta.get("sample_time_s") and not plan.sample_time_s
     if timeless and is_table(columns, nominal):
         return as_table(path, columns, meta, table.problems)

@@ -3,7 +3,8 @@
 
 Structures are flattened: "run.i_a".  Lists of named signals as in dSPACE ControlDesk (X, Y(k).Name, Y(k).Data) and
 Simulink ("structure with time": signals(k).label, .values) are read under the names of the signals.
-Objects of classes (timeseries, table) contain no plain numbers; save arrays or a structure instead.
+Tables and timetables: readers/matlab_tables.py.  Objects of other classes (timeseries) contain no plain numbers; save
+arrays or a structure instead.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from fluxproof.diagnosis.ground.limits import check_cells, most_cells
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.readers.hdf5 import SIGNATURE
 from fluxproof.diagnosis.readers.hdf5_walk import check_readable, check_references, tree
+from fluxproof.diagnosis.readers.matlab_tables import tables_of
 from fluxproof.diagnosis.readers.table import Table, as_columns, chosen, row_limit, too_long
 
 FORMAT = "MATLAB"
@@ -30,6 +32,7 @@ NAMES, VALUES, UNITS = (
     ("Unit", "unit", "Units"),
 )
 DEEP = 12
+OBJECT = "None"  # the name that SciPy gives an object of a class
 
 
 def matches(head: bytes, path) -> bool:
@@ -56,9 +59,13 @@ def read(path, select=None) -> Table:
         _limit_inflated(path)
     arrays: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
-    for name, value in read_mat(str(path)).items():
-        if not name.startswith(("__", "#")):
+    found = read_mat(str(path))
+    for name, value in found.items():
+        if not name.startswith(("__", "#")) and name != OBJECT:
             _collect(name, value, arrays, units, 0)
+    for name, values in (tabled := tables_of(path, found))[0].items():
+        _put(name, values, arrays)
+    units |= tabled[1]
     arrays = {name: a for name, a in arrays.items() if a.size > 1}
     names = chosen({name: units.get(name, "") for name in arrays}, select, path)
     columns, text = as_columns({name: arrays[name] for name in names}, path)

@@ -29,6 +29,7 @@ NUMBER = {
 UNIT_LINE = re.compile(
     r"[\[(]?\s*((s|ms|[uµ]s|A|mA|V|mV|rad|deg|°|rpm|1/min|min-1|rad/s|°C|degC|C|Nm|N[m·.]|%|1|-)\s*)?[\])]?"
 )
+LONGEST_UNIT = 8
 
 
 @dataclass(frozen=True)
@@ -144,8 +145,15 @@ def _header(lines, separator, width):
         if len(rows) == 2:
             break
     names, units = [str(k + 1) for k in range(width)], [""] * width
-    if rows and len(rows) == 2 and all(UNIT_LINE.fullmatch(f) for f in rows[0]):
+    if len(rows) == 2 and _are_units(*rows):
         units, names = [f.strip("[]() ") for f in rows[0]], rows[1]
     elif rows:
         names = rows[0]
     return [name or str(k + 1) for k, name in enumerate(names)], units
+
+
+def _are_units(fields, above) -> bool:
+    """Whether a line under a header is one of units: all are usual ones, or some repeat under names that do not."""
+    stated = [f for f in fields if f]
+    repeat = len(set(stated)) < len(stated) and len(set(above)) == len(above) and all(above)
+    return all(UNIT_LINE.fullmatch(f) for f in fields) or (repeat and all(len(f) <= LONGEST_UNIT for f in fields))
