@@ -262,7 +262,6 @@ FATAL = {
     ),
     "no current": (lambda x: edit(x, i_a=np.full(4000, np.nan), i_b=np.full(4000, np.nan)), "missing"),
     "angle stands": (lambda x: edit(x, theta_e=np.ones(4000)), "stuck"),
-    "time stands": (lambda x: edit(x, t=np.zeros(4000)), "time_order"),
     "huge currents": (lambda x: edit(x, **{n: x[n] * 1e5 for n in ("i_a", "i_b", "i_c")}), "unit"),
     "duties in counts": (
         lambda x: edit(x, **{n: np.round(x[n] * 5000) for n in ("d_a", "d_b", "d_c")}),
@@ -271,6 +270,12 @@ FATAL = {
     "modulation index": (lambda x: edit(x, **{n: 2 * x[n] - 1 for n in ("d_a", "d_b", "d_c")}), "unit"),
     "dead bus": (lambda x: edit(x, u_dc=np.zeros(4000)), "unit"),
 }
+
+
+def test_a_time_that_stands_is_no_time(tmp_path, nominal):
+    recording = load_recording(write(tmp_path / "r.csv", edit(made(), t=np.full(4000, 1.74223e9))), nominal)
+    assert not recording.fatal and np.allclose(np.diff(recording["t"]), T)
+    assert any("the same in all rows and tells no time" in note for note in recording.meta["notes"])
 
 
 @pytest.mark.parametrize("name", FATAL)
