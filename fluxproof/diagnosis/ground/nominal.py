@@ -42,7 +42,6 @@ class Inverter(drive.Inverter):
     """[inverter] of any drive."""
 
     dead_time_s: float | None = _any_drive(drive.Inverter, "dead_time_s", None)
-    min_pulse_s: float | None = _any_drive(drive.Inverter, "min_pulse_s", None)
 
 
 @dataclass(frozen=True)
