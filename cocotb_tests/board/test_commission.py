@@ -13,8 +13,9 @@ import pytest
 from cocotb_tests.support.slow import halved
 from fluxproof import command
 from fluxproof.checkout import DRIVES
+from fluxproof.commission import alignment, current_scale, wiring
 from fluxproof.commission import command as commissioning
-from fluxproof.commission import current_scale, wiring
+from fluxproof.commission import session as session_parts
 from fluxproof.commission.bus import CODES, VALUES, WINDOW, BusError, UioBus
 from fluxproof.commission.session import Refusal, Session
 from fluxproof.commission.simulated import SimulatedBus, board_of
@@ -163,6 +164,28 @@ def test_a_signal_leaves_the_gates_off(tmp_path, monkeypatch, number):
     assert command.main(["commission", str(DRIVE), "--out", str(tmp_path)]) == 130
     assert ("enable", 1) in written and bus.read("enable") == 0
     assert json.loads((tmp_path / "commission.json").read_text())["status"] == "stopped"
+
+
+def test_the_host_writes_within_the_heartbeat_of_the_file(monkeypatch):
+    """As far as the encoder's alignment, where a turn of the shaft with 21 pole pairs leaves the longest pauses."""
+    drive = load(DRIVES / "servo_24v.toml")
+    drive = replace(
+        drive,
+        machine=replace(drive.machine, pole_pairs=21, rated_speed_rad_s=314 * 4 / 21),
+        protection=replace(drive.protection, heartbeat_s=0.03),
+    )
+    board = board_of(drive)
+    session = Session(SimulatedBus(drive, board), drive)
+    wiring.offsets(session)
+    alignment.align(session, None)
+    session.gates_on()
+    monkeypatch.setattr(session_parts, "OF_HEARTBEAT", 1.1)
+    session.pause(0.07)
+    with pytest.raises(Refusal, match="tripped: host_lost"):
+        session.snapshot()
+    short = replace(drive, protection=replace(drive.protection, heartbeat_s=0.01))
+    with pytest.raises(Refusal, match=r"heartbeat_s = 0.01: expected at least 0.02 s"):
+        commission(SimulatedBus(short, board), short)
 
 
 def test_another_core_is_refused():

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from fluxproof.commission import alignment, current_scale, motion, winding, wiring
 from fluxproof.commission.bus import Bus, BusError
-from fluxproof.commission.session import Refusal, Session, Step
+from fluxproof.commission.session import LEAST_HEARTBEAT_S, Refusal, Session, Step
 from golden_model.board_registers import board_generics
 from golden_model.drive import Drive
 from golden_model.registers import registers
@@ -24,6 +24,15 @@ def check_generics(bus: Bus, drive: Drive) -> None:
                 f"the core has {name} = {found}, the drive file gives {value}: build it anew or check [core], "
                 "[encoder], [converters]"
             )
+
+
+def check_heartbeat(drive: Drive) -> None:
+    """The host looks every few milliseconds; Refusal where the core would not wait as long."""
+    if 0.0 < drive.protection.heartbeat_s < LEAST_HEARTBEAT_S:
+        raise Refusal(
+            f"[protection] heartbeat_s = {drive.protection.heartbeat_s:g}: expected at least {LEAST_HEARTBEAT_S:g} s, "
+            "or none, since commissioning is no real-time program; a shorter one would trip as host_lost"
+        )
 
 
 def commission(
@@ -49,6 +58,7 @@ def commission(
 
     try:
         check_generics(bus, drive)
+        check_heartbeat(drive)
         add(wiring.offsets(session))
         add(wiring.phases(session))
         if hold_a is not None:
