@@ -20,6 +20,7 @@ from golden_model.drive_checks import check
 from golden_model.drive_file import read_sections
 from golden_model.drive_keys import DriveError, flag, not_negative, positive, real, trim, whole
 from golden_model.front_ends import Converters, Encoder
+from golden_model.supply import Supply
 
 
 @dataclass(frozen=True)
@@ -221,6 +222,7 @@ class Drive:
     sampling: Sampling = Sampling()
     encoder: Encoder = Encoder()
     converters: Converters = Converters()
+    supply: Supply = Supply()
 
     def __post_init__(self):
         check(self)
@@ -277,6 +279,7 @@ SECTIONS = {
     "sampling": Sampling,
     "encoder": Encoder,
     "converters": Converters,
+    "supply": Supply,
 }
 
 
