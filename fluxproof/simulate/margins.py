@@ -138,11 +138,9 @@ def margins(loop: Loop) -> Margins:
     if not loop.both:
         return found
     other = _margins(loop, hz, np.conj(loop.response(-hz)))
-    phase, gain = (
-        [m for m in (found, other) if getattr(m, key) is not None] for key in ("phase_margin_deg", "gain_margin_db")
-    )
-    worse = min(phase, key=lambda m: m.phase_margin_deg, default=found)
-    return replace(worse, gain_margin_db=min((m.gain_margin_db for m in gain), default=None))
+    closest = min((found, other), key=lambda m: np.inf if m.phase_margin_deg is None else m.phase_margin_deg)
+    gains = [m.gain_margin_db for m in (found, other) if m.gain_margin_db is not None]
+    return replace(closest, gain_margin_db=min(gains, default=None))
 
 
 def _margins(loop: Loop, hz: np.ndarray, gain: np.ndarray) -> Margins:
