@@ -184,6 +184,9 @@ class Core:
     clock_hz: float = positive("Hz", "of the core; a whole multiple of twice the PWM frequency")
     updates_per_period: int = whole(1, 2, "1: sampled and updated at the valley; 2: at the valley and the peak", 1)
     estimators: bool = flag("false: field-oriented control alone; flux_mode and the compensation have no effect", True)
+    gate_active: int = whole(0, 1, "level of the gate pins at which a switch is on", 1)
+    trip_active: int = whole(0, 1, "level of the pin trip that turns the gates off", 1)
+    brake_active: int = whole(0, 1, "level of the pin brake at which the resistor is on", 1)
 
 
 @dataclass(frozen=True)

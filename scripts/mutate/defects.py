@@ -44,7 +44,7 @@ DEFECTS = (
     Defect("unaligned address taken", "io/register_access.vhd", "address(1 downto 0) = 0 and ", ""),
     Defect("setting counts inside a sample", "generated/register_file.vhd", "(row(2) and column(4) and not sample_busy)", "(row(2) and column(4))"),
     Defect("old values read after reset", "generated/register_file.vhd", "        written                   <= (others => '0');\n", ""),
-    Defect("short trip forgotten", "io/power_stage.vhd", "    if trip_pin = '1' then", "    if trip_pin = '1' and rising_edge(clk) then"),
+    Defect("short trip forgotten", "io/power_stage.vhd", "    if trip_on = '1' then", "    if trip_on = '1' and rising_edge(clk) then"),
     Defect("gates let go before the core knows", "io/power_stage.vhd", "if sync_2 = '1' or rst = '1' then", "if sync_1 = '1' or rst = '1' then"),
     Defect("trip kept for ever", "io/power_stage.vhd", "if sync_2 = '1' or rst = '1' then", "if rst = '1' then"),
     Defect("one synchroniser stage", "io/power_stage.vhd", "trip <= sync_2;", "trip <= sync_1;"),
