@@ -95,8 +95,8 @@ def check_encoder(drive):
             raise DriveError(
                 f"[encoder] pause_s = {wanted:g} s{given} is out of range: allowed is up to {rest:.4g} s, "
                 f"which a frame of {frame_s(drive):.4g} s leaves between two samples; in a shorter one the encoder is "
-                "not ready and answers every second frame only: give the pause of its data sheet, a faster clock_hz or a "
-                "slower PWM"
+                "not ready and answers every second frame only: give the pause of its data sheet, a faster clock_hz "
+                "or a slower PWM"
             )
         if not e.clock_hz <= drive.core.clock_hz / 4.0:
             _refuse("[encoder] clock_hz", e.clock_hz, f"up to {drive.core.clock_hz / 4.0:g} Hz, a quarter of clock_hz")
