@@ -18,8 +18,9 @@ from dataclasses import dataclass
 
 from golden_model.drive_checks import check
 from golden_model.drive_file import read_sections
-from golden_model.drive_keys import DriveError, flag, not_negative, positive, real, whole
+from golden_model.drive_keys import DriveError, flag, not_negative, positive, real, trim, whole
 from golden_model.front_ends import Converters, Encoder
+from golden_model.supply import Supply
 
 
 @dataclass(frozen=True)
@@ -54,12 +55,23 @@ class Inverter:
     dc_bus_v: float = positive("V", "nominal bus voltage")
     pwm_frequency_hz: float = positive("Hz", "one carrier up and down")
     dead_time_s: float = positive("s", "both gates of a leg off")
-    min_pulse_s: float = positive("s", "shortest pulse, longer than the dead time")
+    min_on_time_s: float | None = positive("s", "shortest time that a switch is on", None)
+    min_pulse_s: float | None = positive("s", "shortest pulse of a leg, dead time included", None)
     v_switch_v: float = not_negative("V", "threshold of the switch", 0.0)
     v_diode_v: float = not_negative("V", "threshold of the diode", 0.0)
     r_switch_ohm: float = not_negative("ohm", "slope of the switch", 0.0)
     r_diode_ohm: float = not_negative("ohm", "slope of the diode", 0.0)
     zero_current_a: float = not_negative("A", "width of the zone around zero current", 0.0)
+
+    @property
+    def leg_pulse_s(self):
+        """Shortest pulse of a leg: what the switch sees and the dead time, which takes its part of every pulse."""
+        return self.min_pulse_s if self.min_on_time_s is None else self.dead_time_s + self.min_on_time_s
+
+    @property
+    def on_time_s(self):
+        """Shortest time that a switch is on."""
+        return self.leg_pulse_s - self.dead_time_s if self.min_on_time_s is None else self.min_on_time_s
 
 
 @dataclass(frozen=True)
@@ -111,10 +123,10 @@ class Sensors:
     u_dc_range_v: float = positive("V", "bus voltage at full code")
     position_bits: int = whole(8, 18, "codes per mechanical turn")
     current_offset_code: tuple | None = real("codes", "at zero current, mid code if none", None, count=3)
-    current_gain: tuple = real("1", "trim, negative for a reversed sensor", (1.0, 1.0, 1.0), 3, nonzero=True)
+    current_gain: tuple = trim("negative for a reversed sensor", (1.0, 1.0, 1.0), 3, signed=True)
     current_sensors: int = whole(2, 3, "3, or 2: phase a has none, its current is minus the sum of the others", 3)
     u_dc_offset_code: float = not_negative("codes", "at zero volts", 0.0)
-    u_dc_gain: float = real("1", "trim", 1.0, nonzero=True)
+    u_dc_gain: float = trim("of the bus voltage", 1.0)
     position_reverse: bool = flag("true: the code counts against the phase order", False)
     theta_offset_rad: float = real("rad", "electrical angle at code zero", 0.0)
 
@@ -172,6 +184,9 @@ class Core:
     clock_hz: float = positive("Hz", "of the core; a whole multiple of twice the PWM frequency")
     updates_per_period: int = whole(1, 2, "1: sampled and updated at the valley; 2: at the valley and the peak", 1)
     estimators: bool = flag("false: field-oriented control alone; flux_mode and the compensation have no effect", True)
+    gate_active: int = whole(0, 1, "level of the gate pins at which a switch is on", 1)
+    trip_active: int = whole(0, 1, "level of the pin trip that turns the gates off", 1)
+    brake_active: int = whole(0, 1, "level of the pin brake at which the resistor is on", 1)
 
 
 @dataclass(frozen=True)
@@ -210,6 +225,7 @@ class Drive:
     sampling: Sampling = Sampling()
     encoder: Encoder = Encoder()
     converters: Converters = Converters()
+    supply: Supply = Supply()
 
     def __post_init__(self):
         check(self)
@@ -266,6 +282,7 @@ SECTIONS = {
     "sampling": Sampling,
     "encoder": Encoder,
     "converters": Converters,
+    "supply": Supply,
 }
 
 

@@ -9,6 +9,8 @@ from golden_model.formats import PU, VECTOR
 from golden_model.front_ends import check_converters, check_encoder
 
 CARRIER_HALF_RANGE = (8, 32767)  # generic CARRIER_HALF of rtl/fluxproof.vhd
+ON_OF_DEAD, ON_S = 0.05, 20e-9  # shortest time that a switch is on: of the dead time, and at least
+TURN_SAMPLES = 4.0 * math.pi  # register t_s is a fraction of half a radian at the base of the speed
 WHOLE = 1e-6  # relative; a decimal fraction with seven digits counts as exact
 
 
@@ -47,8 +49,12 @@ def _carrier(drive):
     keys = f"[core] clock_hz = {clock:g} and [inverter] pwm_frequency_hz = {pwm:g}"
     lo, hi = CARRIER_HALF_RANGE
     if not lo <= exact <= hi or abs(exact / round(exact) - 1.0) > WHOLE:
-        allowed = f"a whole number from {lo} to {hi}"
-        raise DriveError(f"{keys} make {exact:.9g} clocks in half a PWM period: allowed is {allowed}")
+        around = {min(max(half, lo), hi) for half in (math.ceil(min(exact, hi)), math.floor(min(exact, hi)))}
+        nearest = " and ".join(f"{clock / (2.0 * half):.7g} Hz" for half in sorted(around, reverse=True))
+        raise DriveError(
+            f"{keys} make {exact:.9g} clocks in half a PWM period: allowed is a whole number from {lo} to {hi}; "
+            f"the nearest PWM frequencies with this clock: {nearest}"
+        )
     if drive.core.updates_per_period == 2 and exact < SAMPLE_INTERVAL:
         raise DriveError(
             f"{keys} make {exact:.9g} clocks in half a PWM period: with [core] updates_per_period = 2 each half has a "
@@ -57,13 +63,50 @@ def _carrier(drive):
 
 
 def _pulses(drive):
-    """gate_generation refuses anything but 0 < dead_time < min_pulse <= half a period."""
-    inverter = drive.inverter
-    dead, pulse, half = inverter.dead_time_s, inverter.min_pulse_s, 0.5 / inverter.pwm_frequency_hz
+    """The dead time comes off every pulse of a leg: what is left for the switch must be long enough to switch it.
+
+    The dead time is the drive's own measure of how slow its switches are: it covers their turn-off and its spread.  A
+    switch that is on for less than a twentieth of it is off again before it conducts, and no gate driver passes less
+    than 20 ns reliably.  gate_generation besides takes no pulse above half a period.
+    """
+    i = drive.inverter
+    if i.min_on_time_s is None and i.min_pulse_s is None:
+        raise DriveError("[inverter] min_on_time_s is missing: the shortest time that a switch is on, or min_pulse_s")
+    if i.min_on_time_s is not None and i.min_pulse_s is not None:
+        raise DriveError("[inverter] min_on_time_s and min_pulse_s are both given: allowed is one of them")
+    dead, pulse, half = i.dead_time_s, i.leg_pulse_s, 0.5 / i.pwm_frequency_hz
     if not dead < pulse:
         _refuse("[inverter] dead_time_s", dead, f"above 0 and below min_pulse_s = {pulse:g} s")
+    least = max(ON_OF_DEAD * dead, ON_S)
+    if i.on_time_s < least * (1.0 - WHOLE):
+        why = f"{least:g} s, a twentieth of dead_time_s and {ON_S:g} s at least: shorter pulses do not turn a switch on"
+        if i.min_on_time_s is not None:
+            _refuse("[inverter] min_on_time_s", i.min_on_time_s, f"at least {why}")
+        seen = f"leave the switch {i.on_time_s:.4g} s"
+        raise DriveError(
+            f"[inverter] min_pulse_s = {pulse:g} and dead_time_s = {dead:g} {seen}: allowed is at least {why}"
+        )
     if not pulse <= half:
-        _refuse("[inverter] min_pulse_s", pulse, f"up to half a PWM period, {half:g} s")
+        key = "min_pulse_s" if i.min_on_time_s is None else "dead_time_s + min_on_time_s"
+        _refuse(f"[inverter] {key}", pulse, f"up to half a PWM period, {half:g} s")
+
+
+def _samples_per_turn(drive):
+    """Flux models and chord integrate over a sample: its angle at the base of the speed is below half a radian."""
+    rate, w = 1.0 / drive.sample_time_s, drive.bases.omega_me_rad_s
+    samples = 2.0 * math.pi * rate / w
+    if samples > TURN_SAMPLES:
+        return
+    keys = f"[machine] pole_pairs = {drive.machine.pole_pairs}, rated_speed_rad_s = {drive.machine.rated_speed_rad_s:g}"
+    if drive.base_choice.omega_me_rad_s is not None:
+        keys = f"[bases] omega_me_rad_s = {w:g}"
+    pwm = TURN_SAMPLES * w / (2.0 * math.pi) / drive.core.updates_per_period
+    twice = " or [core] updates_per_period = 2" if drive.core.updates_per_period == 1 else ""
+    keys = f"{keys} with [inverter] pwm_frequency_hz = {drive.inverter.pwm_frequency_hz:g}"
+    raise DriveError(
+        f"{keys} make {samples:.4g} samples in an electrical turn: allowed is above {TURN_SAMPLES:.4g}, "
+        f"that is pwm_frequency_hz above {pwm:.6g} Hz{twice}"
+    )
 
 
 def _voltage(drive):
@@ -177,6 +220,6 @@ def _protection(drive):
 
 
 RULES = (
-    _sample_time, _sampling, _carrier, _pulses, _voltage, _current, _flux, _codes, _speed_loop, _current_loop,
-    _flux_loop, _adaline_steps, _protection, check_encoder, check_converters,
+    _sample_time, _sampling, _carrier, _pulses, _samples_per_turn, _voltage, _current, _flux, _codes, _speed_loop,
+    _current_loop, _flux_loop, _adaline_steps, _protection, check_encoder, check_converters,
 )  # fmt: skip

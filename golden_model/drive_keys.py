@@ -21,6 +21,7 @@ RANGES = {
     "V": (1e-6, 1e6),
     "ohm": (1e-7, 1e6),
     "H": (1e-9, 1e4),
+    "F": (1e-9, 1e4),
     "Wb": (1e-9, 1e5),
     "rad/s": (1e-6, 1e6),
     "kg m2": (1e-15, 1e10),
@@ -45,6 +46,8 @@ RANGES = {
     "W": (1e-9, 1e12),
 }
 
+TRIM = 2.0  # largest trim of a sensor, its inverse the least
+
 
 class DriveError(ValueError):
     """An invalid drive description; the message is one line for its author."""
@@ -52,13 +55,13 @@ class DriveError(ValueError):
 
 @dataclass(frozen=True)
 class Key:
-    """Type and legal range of one key, both ends included; ``nonzero``: zero in between is excluded."""
+    """Type and legal range of one key, both ends included; ``least``: smaller magnitudes between them are excluded."""
 
     kind: str  # "float", "int", "bool", "word"
     unit: str = "1"
     lo: float = -math.inf
     hi: float = math.inf
-    nonzero: bool = False
+    least: float = 0.0
     count: int = 0  # 0: a single value; n: a list of n values
     doc: str = ""
     words: tuple = ()  # of a "word": the allowed ones
@@ -67,7 +70,7 @@ class Key:
         """Whether one number is finite and within the range, or a word one of the allowed."""
         if self.kind == "word":
             return value in self.words
-        return self.lo <= value <= self.hi and math.isfinite(value) and not (self.nonzero and value == 0)
+        return self.lo <= value <= self.hi and math.isfinite(value) and abs(value) >= self.least
 
     @property
     def allowed(self):
@@ -75,17 +78,23 @@ class Key:
         if self.kind == "word":
             return f"{', '.join(self.words[:-1])} or {self.words[-1]}"
         unit = "" if self.unit == "1" else f" {self.unit}"
-        return f"{self.lo:.10g} up to {self.hi:.10g}{unit}{' but not 0' if self.nonzero else ''}"
+        inner = f"{-self.least:.10g} or {self.least:.10g} up to " if self.lo < 0.0 < self.least else ""
+        return f"{self.lo:.10g} up to {inner}{self.hi:.10g}{unit}"
 
 
 def _field(key, default):
     return dataclasses.field(default=default, metadata={"key": key})
 
 
-def real(unit, doc, default=MISSING, count=0, nonzero=False):
+def real(unit, doc, default=MISSING, count=0):
     """A real number of either sign, within the range of its unit."""
     least, most = RANGES[unit]
-    return _field(Key("float", unit, -most if least > 0.0 else least, most, nonzero, count, doc), default)
+    return _field(Key("float", unit, -most if least > 0.0 else least, most, count=count, doc=doc), default)
+
+
+def trim(doc, default, count=0, signed=False):
+    """A factor around one: what is beyond half or twice is another range or unit, and blinds the core to its sensor."""
+    return _field(Key("float", "1", -TRIM if signed else 1.0 / TRIM, TRIM, 1.0 / TRIM, count, doc), default)
 
 
 def positive(unit, doc, default=MISSING, most=None):

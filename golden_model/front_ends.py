@@ -13,9 +13,9 @@ ENCODERS = {
     "code": ((), ()),
     "abz": (("counts",), ("filter_s", "index_phase")),
     "hall": ((), ("filter_s",)),
-    "ssi": (("bits", "clock_hz"), ("turns_bits", "crc", "gray", "bridge_samples")),
-    "biss": (("bits", "clock_hz"), ("turns_bits", "crc", "start_s", "bridge_samples")),
-    "endat": (("bits", "clock_hz"), ("turns_bits", "crc", "version", "start_s", "bridge_samples")),
+    "ssi": (("bits", "clock_hz"), ("turns_bits", "crc", "gray", "pause_s", "bridge_samples")),
+    "biss": (("bits", "clock_hz"), ("turns_bits", "crc", "start_s", "pause_s", "bridge_samples")),
+    "endat": (("bits", "clock_hz"), ("turns_bits", "crc", "version", "start_s", "pause_s", "bridge_samples")),
 }
 CONVERTERS = {
     "codes": ((), ("currents",)),
@@ -28,6 +28,10 @@ CONVERTERS = {
 }
 # Periods of the serial clock in a frame beside the word, see docs/board.md; BiSS-C and EnDat need start_s besides
 FRAME_PERIODS = {"ssi": 3, "biss": 11, "endat": 18}
+# Rest of the clock that an encoder wants before the next frame, where the drive file gives none: monoflop of SSI and
+# timeout of BiSS-C, 20 us as most data sheets; recovery of EnDat 2.1, at most 30 us, and of 2.2, 3.75 us
+PAUSE_S = {"ssi": 20e-6, "biss": 20e-6, "endat": 30e-6}
+PAUSE_2_2_S = 3.75e-6
 SPI_RATIO = (4, 16)  # clocks of the core in one of the converter, see converters/spi_converter
 
 
@@ -44,6 +48,7 @@ class Encoder:
     gray: bool = flag("ssi: the word is in Gray code", False)
     version: str = choice(("2.1", "2.2"), "endat: mode command of 2.1, or 2.2 with two error bits", "2.2")
     start_s: float = positive("s", "biss, endat: longest time to the start bit", 5e-6)
+    pause_s: float | None = not_negative("s", "ssi, biss, endat: rest of the clock after a frame, data sheet", None)
     bridge_samples: int = whole(0, 255, "ssi, biss, endat: samples without a good frame that are bridged", 3)
     filter_s: float | None = not_negative("s", "abz, hall: shorter pulses on a pin have no effect", None)
     index_phase: int | None = whole(0, 3, "abz: quarter of a line in which Z counts; A, B = 00, 10, 11, 01", None)
@@ -84,8 +89,24 @@ def check_encoder(drive):
             left = drive.sample_time_s - waits
             least = (frame_s(drive) - waits) * e.clock_hz / left if left > 0.0 else float("inf")
             _refuse("[encoder] clock_hz", e.clock_hz, f"above {least:.6g} Hz: a frame must end within a PWM period")
+        rest, wanted = drive.sample_time_s - frame_s(drive), pause_s(drive)
+        if rest < wanted:
+            given = "" if e.pause_s is not None else f", ordinary for {e.kind},"
+            raise DriveError(
+                f"[encoder] pause_s = {wanted:g} s{given} is out of range: allowed is up to {rest:.4g} s, "
+                f"which a frame of {frame_s(drive):.4g} s leaves between two samples; in a shorter one the encoder is "
+                "not ready and answers every second frame only: give the pause of its data sheet, a faster clock_hz "
+                "or a slower PWM"
+            )
         if not e.clock_hz <= drive.core.clock_hz / 4.0:
             _refuse("[encoder] clock_hz", e.clock_hz, f"up to {drive.core.clock_hz / 4.0:g} Hz, a quarter of clock_hz")
+
+
+def pause_s(drive):
+    """How long the clock of a serial encoder must rest between two frames [s]."""
+    e = drive.encoder
+    ordinary = PAUSE_2_2_S if e.kind == "endat" and e.version == "2.2" else PAUSE_S[e.kind]
+    return ordinary if e.pause_s is None else e.pause_s
 
 
 def frame_s(drive, period_s=None):

@@ -83,13 +83,14 @@ def _printed(entry, port, integer):
 
 
 def _keep_pulse_above_dead_time(rows, drive):
-    """With a slow clock both times may round up to the same clock; the pulse is then one clock longer."""
+    """Both times are rounded up, so that their difference may lose a clock: what min_on_time_s asks for is kept."""
     dead, most = rows["dead_time"].integer, min(drive.carrier_half, REGISTERS["min_pulse"].high)
-    pulse = max(rows["min_pulse"].integer, dead + 1)
+    asked = drive.inverter.min_on_time_s or 0.0
+    least = dead + max(math.ceil(asked * drive.core.clock_hz * (1.0 - 1e-9)), 1)
+    pulse = max(rows["min_pulse"].integer, least)
+    entry = next(e for e in gates(drive) if e.name == "min_pulse")
     if pulse > most:
         raise DriveError(
-            "register min_pulse from [inverter] dead_time_s, min_pulse_s; [core] clock_hz: "
-            f"{pulse} clocks is out of range: allowed is {dead + 1} to {most}"
+            f"register min_pulse from {entry.keys}: {pulse} clocks is out of range: allowed is {least} to {most}"
         )
-    entry = next(e for e in gates(drive) if e.name == "min_pulse")
     rows["min_pulse"] = _printed(entry, REGISTERS["min_pulse"], pulse)

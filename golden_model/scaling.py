@@ -240,9 +240,10 @@ def psi_eta(drive):
 
 def gates(drive):
     """Times of the gate signals in clocks, and how often they are updated."""
-    for name in ROUND_UP:
-        keys = f"[inverter] {name}_s; [core] clock_hz"
-        yield Entry(name, getattr(drive.inverter, f"{name}_s"), "s", 1.0 / drive.core.clock_hz, keys)
+    i, clock_s = drive.inverter, 1.0 / drive.core.clock_hz
+    keys = "min_pulse_s" if i.min_on_time_s is None else "min_on_time_s, dead_time_s"
+    yield Entry("dead_time", i.dead_time_s, "s", clock_s, "[inverter] dead_time_s; [core] clock_hz")
+    yield Entry("min_pulse", i.leg_pulse_s, "s", clock_s, f"[inverter] {keys}; [core] clock_hz")
     yield Entry("double_update", drive.core.updates_per_period - 1, "1", 1.0, "[core] updates_per_period")
 
 

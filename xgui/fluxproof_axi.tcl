@@ -9,6 +9,9 @@ proc init_gui {IPINST} {
   ipgui::add_param $IPINST -name "POSITION_BITS" -parent ${page}
   ipgui::add_param $IPINST -name "CARRIER_HALF" -parent ${page}
   ipgui::add_param $IPINST -name "ESTIMATORS" -parent ${page}
+  ipgui::add_param $IPINST -name "GATE_ACTIVE" -parent ${page}
+  ipgui::add_param $IPINST -name "TRIP_ACTIVE" -parent ${page}
+  ipgui::add_param $IPINST -name "BRAKE_ACTIVE" -parent ${page}
 }
 
 proc update_PARAM_VALUE.CLOCK_HZ {PARAM_VALUE.CLOCK_HZ} {
@@ -64,4 +67,37 @@ proc validate_PARAM_VALUE.ESTIMATORS {PARAM_VALUE.ESTIMATORS} {
 
 proc update_MODELPARAM_VALUE.ESTIMATORS {MODELPARAM_VALUE.ESTIMATORS PARAM_VALUE.ESTIMATORS} {
   set_property value [get_property value ${PARAM_VALUE.ESTIMATORS}] ${MODELPARAM_VALUE.ESTIMATORS}
+}
+
+proc update_PARAM_VALUE.GATE_ACTIVE {PARAM_VALUE.GATE_ACTIVE} {
+}
+
+proc validate_PARAM_VALUE.GATE_ACTIVE {PARAM_VALUE.GATE_ACTIVE} {
+  return true
+}
+
+proc update_MODELPARAM_VALUE.GATE_ACTIVE {MODELPARAM_VALUE.GATE_ACTIVE PARAM_VALUE.GATE_ACTIVE} {
+  set_property value [get_property value ${PARAM_VALUE.GATE_ACTIVE}] ${MODELPARAM_VALUE.GATE_ACTIVE}
+}
+
+proc update_PARAM_VALUE.TRIP_ACTIVE {PARAM_VALUE.TRIP_ACTIVE} {
+}
+
+proc validate_PARAM_VALUE.TRIP_ACTIVE {PARAM_VALUE.TRIP_ACTIVE} {
+  return true
+}
+
+proc update_MODELPARAM_VALUE.TRIP_ACTIVE {MODELPARAM_VALUE.TRIP_ACTIVE PARAM_VALUE.TRIP_ACTIVE} {
+  set_property value [get_property value ${PARAM_VALUE.TRIP_ACTIVE}] ${MODELPARAM_VALUE.TRIP_ACTIVE}
+}
+
+proc update_PARAM_VALUE.BRAKE_ACTIVE {PARAM_VALUE.BRAKE_ACTIVE} {
+}
+
+proc validate_PARAM_VALUE.BRAKE_ACTIVE {PARAM_VALUE.BRAKE_ACTIVE} {
+  return true
+}
+
+proc update_MODELPARAM_VALUE.BRAKE_ACTIVE {MODELPARAM_VALUE.BRAKE_ACTIVE PARAM_VALUE.BRAKE_ACTIVE} {
+  set_property value [get_property value ${PARAM_VALUE.BRAKE_ACTIVE}] ${MODELPARAM_VALUE.BRAKE_ACTIVE}
 }

@@ -58,6 +58,13 @@ def test_closed_loop_in_ghdl(tmp_path):
     assert facts["board_flags"] == 0 and facts["snap_ready"] == 1
 
 
+@pytest.mark.parametrize("run", ["faults, serial and modulators", "faults, edges"])
+def test_every_fault_of_the_board_through_the_pins(tmp_path, run):
+    """Faults of the front ends, ignored and not, a host that is silent, the trip pin: gates and irq at every clock."""
+    facts = in_ghdl(RUNS[run]().periods, run, tmp_path)
+    assert facts["clocks"] > 10_000 and facts["samples"] > 50 and facts["gates_after"] > 0
+
+
 @pytest.mark.study
 @pytest.mark.timeout(3600)
 def test_closed_loop_over_2000_periods(figure, tmp_path):

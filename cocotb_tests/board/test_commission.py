@@ -13,12 +13,14 @@ import pytest
 from cocotb_tests.support.slow import halved
 from fluxproof import command
 from fluxproof.checkout import DRIVES
+from fluxproof.commission import alignment, current_scale, wiring
 from fluxproof.commission import command as commissioning
-from fluxproof.commission import wiring
+from fluxproof.commission import session as session_parts
 from fluxproof.commission.bus import CODES, VALUES, WINDOW, BusError, UioBus
 from fluxproof.commission.session import Refusal, Session
 from fluxproof.commission.simulated import SimulatedBus, board_of
 from fluxproof.commission.steps import commission
+from fluxproof.plant import layout
 from golden_model.drive import load
 from golden_model.drive_file import read_tables
 from golden_model.drive_keys import DriveError
@@ -71,15 +73,59 @@ def test_two_sensors_are_enough_to_find_a_swapped_one():
 def test_the_command_writes_what_it_measured(tmp_path, capsys):
     assert command.main(["commission", str(DRIVE), "--out", str(tmp_path)]) == 0
     told = capsys.readouterr().out
-    assert told.count("\n") == 8 and "accepted" in told
+    assert told.count("\n") == 9 and "accepted" in told
+    assert "R and L as in the file (R 1.0" in told and "warning" not in told
     found, nominal = load(tmp_path / "drive.toml"), load(DRIVE)
     for key in ("resistance_ohm", "inductance_d_h", "inductance_q_h", "magnet_flux_wb", "inertia_kgm2"):
         assert getattr(found.machine, key) == pytest.approx(getattr(nominal.machine, key), rel=0.03), key
     assert "(1 sigma)" in (tmp_path / "drive.toml").read_text()
     data = json.loads((tmp_path / "commission.json").read_text())
-    assert data["status"] == "accepted" and [s["name"] for s in data["steps"]][-1] == "closed loop"
+    assert data["status"] == "accepted" and [s["name"] for s in data["steps"]][-2:] == ["closed loop", "current scale"]
     assert all(v["sigma"] >= 0.0 for s in data["steps"] for v in s["values"].values())
     assert set(read_tables(tmp_path / "drive.toml")) >= set(read_tables(DRIVE))
+
+
+TURNED = {"resistance_ohm": 1, "inductance_d_h": 1, "inductance_q_h": 1, "inertia_kgm2": -1}
+
+
+def scaled(drive, factor, **others):
+    """What commissioning finds where every true current is ``factor`` times the one that the file's scale gives."""
+    machine = {key: getattr(drive.machine, key) * factor**power for key, power in TURNED.items()} | others
+    return replace(drive, machine=replace(drive.machine, **machine))
+
+
+@pytest.mark.parametrize(("factor", "words"), [(1.28, "1.28 times too small"), (0.8, "1.25 times too large")])
+def test_a_wrong_scale_of_the_currents_is_told(factor, words):
+    drive = load(DRIVE)
+    told = current_scale.compare(drive, scaled(drive, factor))
+    assert told.said.startswith("warning") and words in told.said and "clipping level" in told.said
+    assert "--hold" in told.said and told.values["current_scale"].value == pytest.approx(factor)
+    same = current_scale.compare(drive, scaled(drive, 1.03))
+    assert "as in the file" in same.said and not same.notes.get("warned")
+    another = current_scale.compare(drive, scaled(drive, factor, inductance_q_h=2.0 * drive.machine.inductance_q_h))
+    assert "do not tell it" in another.said and "--hold" in another.said
+    flux = current_scale.compare(drive, scaled(drive, factor, magnet_flux_wb=0.7 * drive.machine.magnet_flux_wb))
+    assert "do not tell it" in flux.said
+
+
+def test_a_current_is_held_for_an_ammeter(tmp_path, capsys, monkeypatch):
+    """The scale of the file is 1.28 too small: what the ammeter shows over what is told is the factor."""
+    monkeypatch.setattr(current_scale, "HOLD_S", 0.5)
+    drive = load(DRIVE)
+    sensors = board_of(drive).sensors
+    board = {"sensors": replace(sensors, current_full_scale_a=1.28 * sensors.current_full_scale_a)}
+    bus, seen = motor_bus(drive, **board), []
+    look = bus.snapshot
+    bus.snapshot = lambda: (seen.append(float(bus._memory.plant[layout.I_A])), look())[1]
+    monkeypatch.setattr(commissioning, "open_bus", lambda name, drive: bus)
+    (tmp_path / "drive.toml").write_text("measured = true\n")
+    assert command.main(["commission", str(DRIVE), "--hold", "20", "--out", str(tmp_path)]) == 0
+    told = capsys.readouterr().out
+    assert "hold: 20 A in phase a, -10 A in b and c" in told and "times the ammeter over 20 A" in told
+    assert max(seen) == pytest.approx(1.28 * 20.0, rel=0.02) and bus.read("enable") == 0
+    assert (tmp_path / "drive.toml").read_text() == "measured = true\n"
+    assert command.main(["commission", str(DRIVE), "--hold", "41", "--out", str(tmp_path)]) == 2
+    assert "--hold 41: allowed is above 0 up to the current limit, 40 A" in capsys.readouterr().err
 
 
 def test_the_command_says_why_it_refuses(tmp_path, capsys, monkeypatch):
@@ -118,6 +164,28 @@ def test_a_signal_leaves_the_gates_off(tmp_path, monkeypatch, number):
     assert command.main(["commission", str(DRIVE), "--out", str(tmp_path)]) == 130
     assert ("enable", 1) in written and bus.read("enable") == 0
     assert json.loads((tmp_path / "commission.json").read_text())["status"] == "stopped"
+
+
+def test_the_host_writes_within_the_heartbeat_of_the_file(monkeypatch):
+    """As far as the encoder's alignment, where a turn of the shaft with 21 pole pairs leaves the longest pauses."""
+    drive = load(DRIVES / "servo_24v.toml")
+    drive = replace(
+        drive,
+        machine=replace(drive.machine, pole_pairs=21, rated_speed_rad_s=314 * 4 / 21),
+        protection=replace(drive.protection, heartbeat_s=0.03),
+    )
+    board = board_of(drive)
+    session = Session(SimulatedBus(drive, board), drive)
+    wiring.offsets(session)
+    alignment.align(session, None)
+    session.gates_on()
+    monkeypatch.setattr(session_parts, "OF_HEARTBEAT", 1.1)
+    session.pause(0.07)
+    with pytest.raises(Refusal, match="tripped: host_lost"):
+        session.snapshot()
+    short = replace(drive, protection=replace(drive.protection, heartbeat_s=0.01))
+    with pytest.raises(Refusal, match=r"heartbeat_s = 0.01: expected at least 0.02 s"):
+        commission(SimulatedBus(short, board), short)
 
 
 def test_another_core_is_refused():

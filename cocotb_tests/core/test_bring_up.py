@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 import shutil
@@ -15,12 +16,13 @@ import pytest
 from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.host.golden_board import GoldenBoard
 from cocotb_tests.support.host.rtl_board import RtlBoard
-from fluxproof.checkout import ROOT
+from fluxproof.checkout import DRIVES, ROOT
 from fluxproof.cosim import verilog
 from fluxproof.print_registers import c_lines
 from golden_model import drive as drives
+from golden_model.board_registers import board_generics, board_set
 from golden_model.io import board_map
-from golden_model.registers import registers
+from golden_model.io.fault_latch import NAMES
 from scripts.registers.rdl import version_word
 
 SOFTWARE = ROOT / "docs" / "software"
@@ -39,7 +41,7 @@ def compiled(folder: Path, drive, bus: Path) -> Path:
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None:
         pytest.skip("there is no C compiler here")
-    header = "\n".join(c_lines(str(PAPER), drive, registers(drive))) + "\n"
+    header = "\n".join(c_lines(str(PAPER), drive, board_set(drive))) + "\n"
     (folder / "drive_registers.h").write_text(header)
     program = folder / f"bring_up_{bus.stem}"
     includes = [f"-I{folder}", f"-I{SOFTWARE}"]
@@ -91,6 +93,44 @@ def test_brings_the_motor_to_speed_and_stops_it(board, drive, program):
     assert abs(board.speeds[-1] * RPM) < 3
     assert "stopped, gates off" in done.stdout and board.gate_word == 0
     assert f"bus {drive.inverter.dc_bus_v:.1f} V" in done.stdout
+
+
+@pytest.mark.parametrize("heartbeat_s", [0.1, 4e-3])
+def test_the_program_writes_within_its_own_heartbeat(drive, tmp_path, heartbeat_s):
+    """4 ms is shorter than the zero check before the gates go on, and than a step of the ramp."""
+    try:
+        verilog.find_ghdl()
+    except verilog.NoUsableGhdl as reason:
+        pytest.skip(str(reason))
+    drive = dataclasses.replace(drive, protection=dataclasses.replace(drive.protection, heartbeat_s=heartbeat_s))
+    program = compiled(tmp_path, drive, ROOT / "cocotb_tests" / "support" / "host" / "bus_pipe.c")
+    board = RtlBoard(drive)
+    done = board.run(program, "300")
+    assert done.returncode == 0 and "stopped, gates off" in done.stdout, done.stdout + done.stderr
+    flags = board_map.registers()["fault_flags"].address
+    assert not board.read(flags)[1] >> NAMES.index("host_lost") & 1
+    board.write(board_map.registers()["enable"].address, 1)
+    for _ in range(round(1.1 * heartbeat_s / board.period_s)):
+        board.run_period()
+    assert board.read(flags)[1] >> NAMES.index("host_lost") & 1, "the heartbeat is not watched here"
+
+
+def test_a_board_with_other_front_ends_is_refused(tmp_path):
+    """The header of a drive file with front ends has their generics; the program compares them before it loads."""
+    drive = drives.load(DRIVES / "servo_24v.toml")
+    program = compiled(tmp_path, drive, ROOT / "cocotb_tests" / "support" / "host" / "bus_pipe.c")
+    for name in ("encoder", "currents", "spi_lines"):
+        board = GoldenBoard(drive, version_word())
+        wanted = board_generics(drive)[name]
+        given = board_generics(drive) | {name: wanted + 1}
+        addresses = {board_map.registers()[n].address: value for n, value in given.items()}
+        read, written = board.read, []
+        board.read = lambda address, read=read, at=addresses: (0, at[address]) if address in at else read(address)
+        board.write = lambda address, word, written=written: written.append((address, word)) or 0
+        done = board.run(program)
+        assert done.returncode == 1, done.stdout
+        assert f"{name.upper()} = {wanted + 1}, drive_registers.h is for {wanted}" in done.stderr, done.stderr
+        assert written == [(board_map.registers()["enable"].address, 0)]
 
 
 def test_trip_during_bring_up_stops_it(board, program):

@@ -5,12 +5,13 @@ import codecs
 import dataclasses
 import json
 import os
+import re
 import subprocess
 import sys
 
 import pytest
 
-from cocotb_tests.support.drives import PAPER, check_message, each_drive, edited
+from cocotb_tests.support.drives import DRIVE_FILES, PAPER, check_message, each_drive, edited
 from fluxproof.checkout import ROOT
 from fluxproof.command import main
 from golden_model.board_registers import board_set, has_board
@@ -18,7 +19,9 @@ from golden_model.drive import Drive, load, with_carrier
 from golden_model.drive_file import read_text
 from golden_model.drive_keys import DriveError
 from golden_model.fluxproof import REGISTERS
+from golden_model.registers import registers
 
+SERVO = next(path for path in DRIVE_FILES if path.stem == "servo_24v")
 WRONG = {  # section, line, what the message must contain besides the file's name
     "unknown key": (
         "machine",
@@ -41,7 +44,10 @@ WRONG = {  # section, line, what the message must contain besides the file's nam
     "extreme": ("machine", "rated_speed_rad_s = 1e-300", "rated_speed_rad_s = 1e-300", "1e-06 up to 1000000 rad/s"),
     "huge inertia": ("machine", "inertia_kgm2 = 1e300", "[machine] inertia_kgm2 = 1e+300", "0 up to 1e+10 kg m2"),
     "huge gain": ("control", "current_kp_d_v_per_a = 1e308", "current_kp_d_v_per_a = 1e+308", "up to 1000000000 V/A"),
-    "no gain": ("sensors", "current_gain = [1, 0, 1]", "current_gain = 0 is", "but not 0"),
+    "no gain": ("sensors", "current_gain = [1, 0, 1]", "current_gain = 0 is", "-2 up to -0.5 or 0.5 up to 2"),
+    "no bus gain": ("sensors", "u_dc_gain = 0", "[sensors] u_dc_gain = 0 is", "0.5 up to 2"),
+    "negative bus": ("sensors", "u_dc_gain = -1", "[sensors] u_dc_gain = -1 is", "0.5 up to 2"),
+    "tiny gain": ("sensors", "current_gain = [1, 1, 1e-3]", "current_gain = 0.001 is", "-0.5 or 0.5"),
     "two extremes": ("control", "speed_kp_as_per_rad = 1e9", "register speed_kp", "out of range"),
     "many bits": ("machine", f"pole_pairs = 0x{'f' * 100000}", "= a whole number of 400000 bits", "1 up to 63"),
     "many digits": ("machine", f"pole_pairs = {'9' * 10000}", "not TOML: a number of too many digits"),
@@ -71,10 +77,24 @@ WRONG = {  # section, line, what the message must contain besides the file's nam
         "[inverter] pwm_frequency_hz",
         "whole number",
     ),
+    "few samples": (
+        "machine",
+        "rated_speed_rad_s = 2e3",
+        "rated_speed_rad_s = 2000 with [inverter] pwm_frequency_hz = 10000 make 7.854 samples in an electrical turn",
+        "above 12.57",
+        "above 16000 Hz or [core] updates_per_period = 2",
+    ),
     "slow clock": ("core", "clock_hz = 1e5", "[core] clock_hz", "8 to 32767"),
     "tiny pwm": ("core", "clock_hz = 1e12", "[core] clock_hz", "8 to 32767"),
     "dead time": ("inverter", "dead_time_s = 3e-6", "[inverter] dead_time_s", "below min_pulse_s = 3e-06 s"),
     "no dead time": ("inverter", "dead_time_s = 0", "[inverter] dead_time_s = 0", "1e-12 up to 1000000 s"),
+    "switch's pulse": (
+        "inverter",
+        "min_pulse_s = 2.005e-6",
+        "min_pulse_s = 2.005e-06 and dead_time_s = 2e-06 leave the switch 5e-09 s",
+        "at least 1e-07 s",
+    ),
+    "two pulses": ("inverter", "min_on_time_s = 1e-6", "min_on_time_s and min_pulse_s are both given"),
     "min pulse": ("inverter", "min_pulse_s = 60e-6", "[inverter] min_pulse_s", "5e-05 s"),
     "bus": ("inverter", "dc_bus_v = 900", "[inverter] dc_bus_v = 900", "sqrt(3)", "866.025 V"),
     "bus range": ("inverter", "dc_bus_v = 1100", "[inverter] dc_bus_v = 1100", "u_dc_range_v = 1000 V"),
@@ -106,7 +126,7 @@ WRONG = {  # section, line, what the message must contain besides the file's nam
         "current_kp_d_v_per_a",
         "16777215",
     ),
-    "register trim": ("sensors", "u_dc_gain = 2.5", "register u_dc_gain", "u_dc_gain", "-131072 to 131071"),
+    "register trim": ("sensors", "u_dc_gain = 2", "register u_dc_gain", "u_dc_gain", "-131072 to 131071"),
     "register zero": (
         "control",
         "speed_ki_a_per_rad = 1e-9",
@@ -225,6 +245,32 @@ def test_mistakes_in_the_other_sections_are_told_by_every_command(tmp_path, caps
         assert main(command) == 2
         assert words[0] in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_the_nearest_pwm_frequencies_are_named_and_accepted():
+    drive = load(SERVO)
+    with pytest.raises(DriveError, match=r"3333\.33333 clocks .*: 14997 Hz and 15001.5 Hz") as refused:
+        dataclasses.replace(drive, inverter=dataclasses.replace(drive.inverter, pwm_frequency_hz=15e3))
+    named = re.findall(r"([0-9.]+) Hz", str(refused.value))
+    halves = [
+        dataclasses.replace(drive, inverter=dataclasses.replace(drive.inverter, pwm_frequency_hz=float(f))).carrier_half
+        for f in named
+    ]
+    assert halves == [3334, 3333]
+
+
+def test_a_switch_is_never_on_for_less_than_its_key_says():
+    """Both times are rounded up to clocks, and the dead time is taken from the pulse."""
+    drive = load(SERVO)
+    for dead, on in ((301e-9, 209e-9), (309e-9, 201e-9), (305e-9, 25e-9), (300e-9, 200e-9)):
+        inverter = dataclasses.replace(drive.inverter, dead_time_s=dead, min_on_time_s=on)
+        values = registers(dataclasses.replace(drive, inverter=inverter)).values
+        left = (values.min_pulse - values.dead_time) / drive.core.clock_hz
+        assert on <= left * (1 + 1e-9) < on + 1.0 / drive.core.clock_hz * (1 + 1e-9)
+    with pytest.raises(DriveError, match="min_on_time_s is missing"):
+        dataclasses.replace(drive, inverter=dataclasses.replace(drive.inverter, min_on_time_s=None))
+    with pytest.raises(DriveError, match="min_on_time_s = 1.9e-08 .* at least 2e-08 s, a twentieth of dead_time_s"):
+        dataclasses.replace(drive, inverter=dataclasses.replace(drive.inverter, min_on_time_s=19e-9))
 
 
 def test_contradictions_are_found_without_a_file():

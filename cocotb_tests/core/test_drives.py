@@ -44,6 +44,15 @@ FRONT_ENDS = {  # text after the paper's drive, what the message must contain
     "no kind": ("[encoder]\ncounts = 4000\n", "[encoder] counts = 4000", 'kind = "code" takes no further key'),
     "no clock": ('[encoder]\nkind = "endat"\nbits = 25\n', "[encoder] clock_hz is missing", "needs bits, clock_hz"),
     "slow frame": ('[encoder]\nkind = "ssi"\nbits = 25\nclock_hz = 1e5\n', "clock_hz = 100000", "PWM period"),
+    "monoflop": (
+        '[encoder]\nkind = "ssi"\nbits = 25\nclock_hz = 3e5\n',
+        "pause_s = 2e-05 s, ordinary for ssi, is out of range: allowed is up to 6.667e-06 s",
+        "every second frame",
+    ),
+    "data sheet": (
+        '[encoder]\nkind = "endat"\nbits = 25\nclock_hz = 1e6\npause_s = 60e-6\n',
+        "pause_s = 6e-05 s is out of range: allowed is up to 5.2e-05 s",
+    ),
     "fast frame": ('[encoder]\nkind = "ssi"\nbits = 25\nclock_hz = 3e7\n', "clock_hz = 30000000", "up to 20000000 Hz"),
     "ratio": ('[converters]\nkind = "spi"\nclock_hz = 30e6\n', "clock_hz = 3e+07", "whole number from 4 to 16"),
     "slow spi": ('[converters]\nkind = "spi"\nclock_hz = 10e6\n', "clock_hz = 1e+07", "from 4 to 16"),

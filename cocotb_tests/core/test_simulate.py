@@ -14,11 +14,12 @@ from cocotb_tests.support.drives import PAPER
 from fluxproof.checkout import DRIVES
 from fluxproof.command import main
 from fluxproof.simulate import scene
-from fluxproof.simulate.margins import current_loop, margins, speed_loop
+from fluxproof.simulate.margins import current_loop, margins, speed_loop, turning_current_loop
 from fluxproof.simulate.session import simulate
 from golden_model.drive import load
 from golden_model.drive_keys import DriveError
 from golden_model.registers import registers
+from golden_model.supply import Supply
 
 DRIVE = load(PAPER)
 
@@ -100,6 +101,67 @@ def test_trip(tmp_path, capsys):
     assert data["figures"]["Currents"]["i_q_tracking_reversal"]["value"] == 0.0  # off: reference and current are zero
 
 
+def fed(name, **keys):
+    """A drive of docs/drives with another [supply], without a brake resistor."""
+    drive = load(DRIVES / f"{name}.toml")
+    protection = dataclasses.replace(drive.protection, brake_on_v=None)
+    return dataclasses.replace(drive, supply=Supply(**keys), protection=protection)
+
+
+@pytest.mark.parametrize("name", ["servo_24v", pytest.param("spindle_400v", marks=pytest.mark.study)])
+def test_a_reversal_behind_a_diode_trips_and_says_what_it_needs(name):
+    """1 mF behind a diode: named with joules, volts and a resistor; with this resistor, or a battery, it is ok."""
+    drive = fed(name)
+    assert drive.supply.source == "diode" and drive.supply.capacitance_f == 1e-3
+    data, _ = simulate(drive, name)
+    assert data["status"] == "tripped" and "u_dc_high" in data["reason"] and "'reversal'" in data["reason"]
+    joule, volts, limit, ohm, on = (
+        float(re.search(pattern, data["reason"])[1])
+        for pattern in (
+            r"feeds back ([\d.]+) J", r"mF to ([\d.]+) V", r"u_dc_max is ([\d.]+) V", r"at most ([\d.]+) ohm",
+            r"from ([\d.]+) V on",
+        )
+    )  # fmt: skip
+    bus = drive.inverter.dc_bus_v
+    assert volts == pytest.approx(np.sqrt(bus**2 + 2.0 * joule / 1e-3), rel=3e-3) and bus < on < limit < volts
+    resistor = dataclasses.replace(drive.supply, brake_resistor_ohm=0.95 * ohm)
+    with_brake = dataclasses.replace(drive, protection=dataclasses.replace(drive.protection, brake_on_v=on))
+    held, _ = simulate(dataclasses.replace(with_brake, supply=resistor), name)
+    found = held["figures"]["Supply"]
+    assert held["status"] == "ok" and found["bus_voltage_highest"]["value"] < limit
+    assert 0.5 * joule < found["brake_resistor_energy"]["value"] < 1.1 * joule
+    large = dataclasses.replace(resistor, brake_resistor_ohm=20.0 * ohm)
+    weak, _ = simulate(dataclasses.replace(with_brake, supply=large), name)
+    assert weak["status"] == "tripped" and "u_dc_high" in weak["reason"]
+
+
+def test_a_battery_takes_back_what_braking_gives():
+    data, _ = simulate(fed("servo_24v", source="battery"), "servo")
+    found = data["figures"]["Supply"]
+    assert data["status"] == "ok" and 24.0 < found["bus_voltage_highest"]["value"] < 25.0
+    assert "brake_resistor_at_most" not in found and any("a battery of 24 V" in line for line in data["modelled"])
+
+
+def test_few_samples_a_turn_show():
+    """13 samples in a turn at rated speed: the single axes' margins say nothing of it, the turning loop's do."""
+    drive = load(DRIVES / "servo_24v.toml")
+    machine = dataclasses.replace(
+        drive.machine, magnet_flux_wb=0.5e-3, rated_speed_rad_s=2400.0, resistance_ohm=0.1, inductance_d_h=0.06e-3,
+        inductance_q_h=0.06e-3,
+    )  # fmt: skip
+    control = dataclasses.replace(drive.control, speed_bandwidth_hz=None)
+    few = dataclasses.replace(
+        drive, machine=machine, control=control, supply=Supply("battery"),
+        encoder=dataclasses.replace(drive.encoder, counts=400, filter_s=None),
+    )  # fmt: skip
+    data, _ = simulate(few, "few samples")
+    currents, margin = data["figures"]["Currents"], data["margins"]
+    assert currents["current_overshoot"]["value"] < 12 < 20 < currents["current_overshoot_at_top_speed"]["value"]
+    assert margin["current loop, q axis"]["phase_margin_deg"] > 60
+    assert margin["current loop, top speed"]["phase_margin_deg"] < 35
+    assert "current loop, top speed" in data["reason"]
+
+
 def test_unsettled_speed():
     """A speed loop that hunts: its filter is a hundred times too slow."""
     data, _ = simulate(changed("control", speed_filter_hz=2.0, speed_bandwidth_hz=60.0), "hunting")
@@ -150,6 +212,40 @@ def test_gain_margin_is_where_the_loop_becomes_unstable():
     margin = 10.0 ** (margins(current_loop(DRIVE, registers(DRIVE), "q")).gain_margin_db / 20.0)
     inside, outside = stepped(DRIVE, 0.99 * margin), stepped(DRIVE, 1.01 * margin)
     assert inside[-50:].max() < 1e-3 < 1.0 < outside[-50:].max()
+
+
+def turned(drive, omega_m: float, gain: float, samples: int = 4000) -> np.ndarray:
+    """The error of the turning loop with ``gain`` times its gains, computed in the stator's frame sample by sample."""
+    gains = {row.name: row.represented for row in registers(drive).rows}
+    kp, ki = (gain * np.mean([gains[f"{name}_d"], gains[f"{name}_q"]]) for name in ("kp", "ki"))
+    m, t_s = drive.machine, drive.sample_time_s
+    henry, phi = 0.5 * (m.inductance_d_h + m.inductance_q_h), m.pole_pairs * omega_m * t_s
+    decay = np.exp(-m.resistance_ohm * t_s / henry)
+    current = integral = waiting = 0.0 + 0.0j  # current and waiting voltage in the stator's frame
+    errors = []
+    for k in range(samples):
+        seen = current * np.exp(-1j * phi * k)
+        error = 1.0 - seen
+        integral += ki * t_s * error
+        rotational = gain * 1j * phi / t_s * (1.0 - phi**2 / 24.0) * henry * seen
+        applied = (kp * error + integral + rotational) * np.exp(1j * phi * (k + 1.5))
+        current = decay * current + (1.0 - decay) / m.resistance_ohm * waiting
+        waiting = applied
+        errors.append(error)
+    return np.abs(errors)
+
+
+def test_the_turning_loop_is_that_of_the_stators_frame():
+    """The poles in the rotor's frame against the currents in the stator's: growth and decay of the error agree."""
+    for speed in (0.0, 314.0, 800.0):
+        loop = turning_current_loop(DRIVE, registers(DRIVE), speed)
+        error = turned(DRIVE, speed, 1.0)
+        rate = (error[1200] / error[200]) ** 1e-3
+        assert rate == pytest.approx(loop.pole(), abs=2e-3) and loop.pole() < 1.0
+    still = margins(turning_current_loop(DRIVE, registers(DRIVE), 0.0))
+    single = [margins(current_loop(DRIVE, registers(DRIVE), axis)) for axis in "dq"]
+    assert still.phase_margin_deg == pytest.approx(np.mean([m.phase_margin_deg for m in single]), abs=0.5)
+    assert still.gain_margin_db == pytest.approx(np.mean([m.gain_margin_db for m in single]), abs=0.1)
 
 
 def test_crossover_and_phase_are_those_of_the_continuous_loop():

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import date, timedelta
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from scripts.mutate.equivalent import DIFFERENT, EQUIVALENT, UNKNOWN
 from scripts.mutate.judge import KILLED, WrongHarness, judge
 from scripts.mutate.subject import Subject
 
-SMALL = Subject("position", 2)
+SMALL, SEED = Subject("position", 2), 1
 
 
 @pytest.fixture(autouse=True)
@@ -35,10 +36,10 @@ def tools():
 @pytest.mark.slow
 def test_small_block(tools):
     """Most mutants are noticed, some are proved equivalent, none is left; the same seed draws the same mutants."""
-    found = judge(SMALL, command.SEED)
+    found = judge(SMALL, SEED)
     assert len(found.outcomes) >= 16 and found.count(KILLED) >= 12 and found.count(EQUIVALENT) >= 1
     assert found.count(DIFFERENT) == found.count(UNKNOWN) == 0
-    result = command.summary([found], command.SEED, 1.0)
+    result = command.summary([found], SEED, 1.0)
     assert result["survivors"] == [] and command.share(result) == 1.0
     assert result["per_block"]["position"]["mutants"] == result["mutants"] == len(found.outcomes)
 
@@ -47,13 +48,13 @@ def test_small_block(tools):
 @pytest.mark.parametrize("subject", [SMALL, Subject("current_limit", 0), Subject("current_directions", 0)])
 def test_bench_without_comparison_is_noticed(tools, subject):
     """The same mutants with nothing compared: all survive, and none that the bench notices is proved equivalent."""
-    noticed = {mutation for mutation, outcome in judge(subject, command.SEED).outcomes if outcome == KILLED}
+    noticed = {mutation for mutation, outcome in judge(subject, SEED).outcomes if outcome == KILLED}
     (trial,) = subject.trials()
     nothing = np.empty((0, 3), np.int64)
-    blind = judge(subject, command.SEED, [replace(trial, checks=nothing, still=np.empty(0, np.int64))])
+    blind = judge(subject, SEED, [replace(trial, checks=nothing, still=np.empty(0, np.int64))])
     assert blind.count(KILLED) == 0
     assert not noticed & {mutation for mutation, outcome in blind.outcomes if outcome == EQUIVALENT}
-    result = command.summary([blind], command.SEED, 1.0)
+    result = command.summary([blind], SEED, 1.0)
     assert command.share(result) < command.ENOUGH and not all(row["reason"] for row in result["survivors"])
 
 
@@ -64,16 +65,21 @@ def test_netlist_that_is_not_its_model_is_an_error(tools):
     checks = trial.checks.copy()
     checks[len(checks) // 2, 2] ^= 1
     with pytest.raises(WrongHarness, match="without a mutation differs"):
-        judge(SMALL, command.SEED, [replace(trial, checks=checks)])
+        judge(SMALL, SEED, [replace(trial, checks=checks)])
+
+
+def test_every_day_draws_others():
+    seeds = {command.seed_of(date(2026, 11, 1) + timedelta(days=k)) for k in range(400)}
+    assert len(seeds) == 400 and command.seed_of(date(2026, 11, 28)) == 20261128
 
 
 @pytest.mark.parametrize("defect", defects.DEFECTS, ids=lambda d: d.says.replace(" ", "_"))
 def test_text_of_a_planted_defect_occurs_once(defect):
-    assert len(defects.DEFECTS) <= 20
+    assert len(defects.DEFECTS) <= 24
     assert (RTL / defect.file).read_text().count(defect.old) == 1
     assert defect.old != defect.new
 
 
 def test_every_reason_is_of_a_block_that_is_mutated():
-    names = {subject.of for subject in command.subjects()} | {command.Core().of}
+    names = {subject.of for subject in command.subjects()} | {command.Core().of, command.Board(0).of}
     assert {block for block, _, _ in table.REASONS} <= names

@@ -12,8 +12,9 @@ import pytest
 
 from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.vivado.tclsh import stubbed
-from fluxproof.checkout import ROOT
+from fluxproof.checkout import DRIVES, ROOT
 from fluxproof.command import main
+from fluxproof.project import need
 from golden_model.drive import load
 from golden_model.registers import registers
 from scripts.package import axi_top
@@ -73,6 +74,7 @@ def test_nothing_else_depends_on_the_clock(tmp_path):
 def test_generics_are_those_of_the_top(tmp_path):
     folder, files, drive = made(tmp_path, adc_bits="12", position_bits="14")
     config = registers(drive).config._asdict() | {"clock_hz": 200_000_000}
+    config |= {"gate_active": 1, "trip_active": 1, "brake_active": 1}
     for name in axi_top.GENERICS:
         assert f"set {name.lower()} {config[name.lower()]}\n" in files["project.tcl"]
         assert re.search(rf"{name} +: natural := {config[name.lower()]};", files["drive_pkg.vhd"])
@@ -139,3 +141,44 @@ def test_mistakes_write_nothing(tmp_path, capsys, options, change, words):
     assert out == "" and err.count("\n") == 1 and not (tmp_path / "out").exists()
     for word in words:
         assert word in err
+
+
+def test_a_part_that_is_too_small_is_told(tmp_path, capsys):
+    """81 of 80 DSP48: the files are written, and the key that makes it fit is named."""
+    drive = DRIVES / "spindle_400v.toml"
+    for part, words in (
+        (
+            "xc7z010clg400-1",
+            "needs about 81 DSP48 and 10,514 LUT, xc7z010 has 80 DSP48 and 17,600 LUT: it does not fit",
+        ),
+        ("xc7s15cpga196-1", "xc7s50 is large enough"),
+    ):
+        assert main(["project", str(drive), "--part", part, "--out", str(tmp_path / part)]) == 0
+        err = capsys.readouterr().err
+        assert err.count("\n") == 1 and words in err
+        assert ("[core] estimators = false needs 33 DSP48" in err) == (part == "xc7z010clg400-1")
+    assert main(["project", str(drive), "--part", ZYNQ, "--out", str(tmp_path / "fits")]) == 0
+    out, err = capsys.readouterr()
+    assert err == "" and "xc7z020 has 220 DSP48" in out
+
+
+def test_cells_are_those_that_were_counted():
+    counts = json.loads((ROOT / "docs" / "synth" / "counts.json").read_text())["counts"]
+    for cells, row in (
+        (need.WHOLE, counts["xc7"]["total"]),
+        (need.PLAIN, counts["xc7, ESTIMATORS = 0"]["total"]),
+        (need.REGISTERS, counts["xc7"]["registers_telemetry"]),
+    ):
+        assert cells == (row["lut"], row["dsp"])
+    page = (ROOT / "docs" / "board.md").read_text()
+    found = re.findall(r"^\| `(\w+_front)`, (.*?) \|(.*)\|$", page, re.MULTILINE)
+    rows = {f"{front}, {kind}": cells for front, kind, cells in found}
+    names = {
+        "code": "position_front, external code", "abz": "position_front, A/B/Z", "hall": "position_front, Hall",
+        "ssi": "position_front, SSI", "biss": "position_front, BiSS-C", "endat": "position_front, EnDat",
+        "codes": "current_front, external codes", "spi": "current_front, SPI, four lines",
+        "xadc": "current_front, XADC, 16 bits", "delta_sigma": "current_front, delta-sigma, four modulators",
+    }  # fmt: skip
+    for kind, cells in (need.ENCODERS | need.CONVERTERS).items():
+        lut, _, dsp = (int(text.replace(",", "")) for text in rows[names[kind]].split("|"))
+        assert cells == (lut, dsp), kind

@@ -108,6 +108,20 @@ static bool flag(uint32_t mask)
     return (get(AT(flags)) & mask) != 0;
 }
 
+/* Waits, and writes ``value`` again so often that the core's heartbeat (register heartbeat, in sample times; 0: none)
+ * does not end: a third of it apart.  Without writes the core trips with host_lost. */
+static void wait_writing(uint32_t microseconds, uint32_t offset, uint32_t value)
+{
+    double third = get(AT(heartbeat)) * FLUXPROOF_BASE_SAMPLE_TIME_S * 1e6 / 3.0;
+    uint32_t most = third > 0.0 && third < microseconds ? (uint32_t)fmax(third, 1.0) : microseconds;
+    for (uint32_t left = microseconds; left > 0;) {
+        uint32_t part = most < left ? most : left;
+        wait_us(part);
+        put(offset, value);
+        left -= part;
+    }
+}
+
 /* ------------------------------------------------------------------ the steps */
 
 static void identify(void)
@@ -133,6 +147,11 @@ static void check_generics(void)
         {"CARRIER_HALF", AT(carrier_half), FLUXPROOF_CARRIER_HALF},
         {"CLOCK_HZ", AT(clock_hz), FLUXPROOF_CLOCK_HZ},
         {"ESTIMATORS", AT(estimators), FLUXPROOF_ESTIMATORS},
+#ifdef FLUXPROOF_ENCODER /* the drive file has front ends: the core must be a fluxproof_board with them */
+        {"ENCODER", AT(encoder), FLUXPROOF_ENCODER},
+        {"CURRENTS", AT(currents), FLUXPROOF_CURRENTS},
+        {"SPI_LINES", AT(spi_lines), FLUXPROOF_SPI_LINES},
+#endif
     };
     for (size_t k = 0; k < COUNT(list); k++) {
         uint32_t got = get(list[k].offset);
@@ -181,9 +200,9 @@ static void check_at_rest(void)
 /* The zero of the current sensors is judged over 64 samples with the gates off. */
 static void enable_gates(void)
 {
-    wait_us((unsigned)(1 + 66 * 2e6 * get(AT(carrier_half)) / get(AT(clock_hz))));
+    wait_writing((uint32_t)(1 + 66 * 2e6 * get(AT(carrier_half)) / get(AT(clock_hz))), AT(enable), 0);
     put(AT(enable), 1);
-    wait_us(1000);
+    wait_writing(1000, AT(enable), 1);
     if (!flag(FLUXPROOF__FLAGS__RUNNING_bm))
         fail("gates do not start: flags 0x%04x, first_fault 0x%02x", (unsigned)get(AT(flags)),
              (unsigned)get(AT(first_fault)));
@@ -216,13 +235,11 @@ static void check_running(double most_rpm)
 /* A reference in steps from one value to another, then some time at it; lsb: value of one in the register. */
 static void ramp(uint32_t reference, double lsb, double from, double to, double most_rpm)
 {
-    for (int k = 1; k <= STEPS; k++) {
-        put(reference, (uint32_t)(int32_t)lround((from + (to - from) * k / STEPS) / lsb));
-        wait_us(STEP_US);
-        check_running(most_rpm);
-    }
-    for (int k = 0; k < SETTLE_STEPS; k++) {
-        wait_us(STEP_US);
+    for (int k = 1; k <= STEPS + SETTLE_STEPS; k++) {
+        double part = k < STEPS ? (double)k / STEPS : 1.0;
+        uint32_t value = (uint32_t)(int32_t)lround((from + (to - from) * part) / lsb);
+        put(reference, value);
+        wait_writing(STEP_US, reference, value);
         check_running(most_rpm);
     }
 }

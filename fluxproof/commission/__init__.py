@@ -8,6 +8,7 @@ wiring     offsets of the current sensors; phases and sensors in order
 alignment  direction and offset of the encoder
 winding    R, L_d, L_q and the dead-time voltage
 motion     inertia and friction, magnet flux, a run that predicts its own voltages
+current_scale  the scale of the currents, which only start values or an ammeter can tell
 steps      all of them in order
 document   drive.toml and commission.json
 """

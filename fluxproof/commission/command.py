@@ -35,6 +35,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="sim|/dev/uioN",
         help="the board's registers; default sim: the golden core on the drive of the file",
     )
+    parser.add_argument(
+        "--hold",
+        type=float,
+        metavar="AMPERES",
+        help="only let this direct current flow through phase a, to compare it with an ammeter",
+    )
     parser.add_argument("--out", metavar="DIR", help="folder of the results; default build/commission/NAME")
 
 
@@ -43,6 +49,10 @@ def run(args: argparse.Namespace) -> int:
     drive = load_drive(args.drive)
     if drive.machine.magnet_flux_wb <= 0.0:
         raise DriveError(f"{args.drive}: [machine] magnet_flux_wb = 0: commissioning is for machines with magnets")
+    if args.hold is not None and not 0.0 < args.hold <= drive.current_limit_a:
+        raise DriveError(
+            f"--hold {args.hold:g}: allowed is above 0 up to the current limit, {drive.current_limit_a:g} A"
+        )
     given = read_tables(args.drive).get("sensors", {})
     reverse = given.get("position_reverse")
     folder = Path(args.out) if args.out else Path("build") / "commission" / stem_of(args.drive)
@@ -50,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     check(folder, (DATA, DRIVE, EARLIER))
     _say("loading")
     bus = open_bus(args.bus, drive)
-    return commission_file(bus, args.drive, drive, reverse, folder)
+    return commission_file(bus, args.drive, drive, reverse, folder, args.hold)
 
 
 def open_bus(name: str, drive):
@@ -64,7 +74,7 @@ def open_bus(name: str, drive):
     return UioBus(name)
 
 
-def commission_file(bus, path: str, drive, reverse: bool | None, folder: Path) -> int:
+def commission_file(bus, path: str, drive, reverse: bool | None, folder: Path, hold_a: float | None = None) -> int:
     """The whole of it on an open bus; the exit status."""
     from fluxproof.commission import document
     from fluxproof.commission.session import Refusal
@@ -81,6 +91,8 @@ def commission_file(bus, path: str, drive, reverse: bool | None, folder: Path) -
 
     def ended(status: str, reason: str, found=None) -> None:
         _clear()
+        if hold_a is not None:  # nothing was measured, so an earlier result stays
+            return
         with together(folder, (DATA, DRIVE)) as stage:
             write_json(stage / DATA, document.data(Path(path).name, status, reason, steps, bus.now() - began))
             if found is not None:
@@ -90,7 +102,7 @@ def commission_file(bus, path: str, drive, reverse: bool | None, folder: Path) -
 
     before = _stop_once()
     try:
-        found, _ = commission(bus, drive, reverse, _say, done)
+        found, _ = commission(bus, drive, reverse, _say, done, hold_a)
     except Refusal as refusal:
         ended("refused", str(refusal))
         say(f"fluxproof: {path}: refused: {refusal}", sys.stderr)
@@ -103,7 +115,10 @@ def commission_file(bus, path: str, drive, reverse: bool | None, folder: Path) -
     finally:
         for number, handler in before.items():
             signal.signal(number, handler or signal.SIG_DFL)
-    ended("accepted", "", found)
+    if hold_a is not None:
+        return 0
+    warned = [step.said for step in steps if step.notes.get("warned")]
+    ended("accepted", "; ".join(warned), found)
     say(f"accepted: {folder / DRIVE}, {folder / DATA} ({bus.now() - began:.1f} s of the drive)")
     return 0
 

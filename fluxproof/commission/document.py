@@ -54,6 +54,9 @@ def document(text: str, drive: Drive, steps: list[Step]) -> str:
         if key in file.get("control", {}):
             old = file["control"].pop(key)
             file["control"].add(tomlkit.comment(f"{key} was {old}: now from the bandwidth and the measured values"))
+    for step in steps:
+        if step.name == "current scale":
+            file["sensors"].add(tomlkit.comment(toml_comment(f"scale of the currents: {step.said}")))
     loss = values.get("v_dead")
     if loss is not None:
         text = f"measured: each leg loses {loss.value:.4g} +-{loss.sigma:.2g} V (dead time and devices)"

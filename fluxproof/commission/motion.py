@@ -137,7 +137,7 @@ def _steps(s: Session, current: float, top: float) -> tuple[list[Seen], float]:
             if speed * sign >= target or spent > LONGEST_S:
                 break
             if spent > ROWS * 3.0 * s.t_s:
-                s.bus.wait(spent / ROWS)
+                s.pause(spent / ROWS)
         pieces.append(Seen(s.drive, rows, times))
         if n == 0 and pieces[0].omega_me[-1] < MOVES * top:
             s.gates_off()

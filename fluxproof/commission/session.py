@@ -22,6 +22,8 @@ from golden_model.units import TURN_RAD, from_si, to_si
 
 STOP_OF_LIMIT = 1.05  # of the current limit: a snapshot above ends the commissioning
 TRIPPED = 1 << 1  # of the register flags
+LOOK_S = 5e-3  # between two looks at the currents
+OF_HEARTBEAT, LEAST_HEARTBEAT_S = 1.0 / 3.0, 4.0 * LOOK_S  # longest wait without a write; what such a host can keep
 # Nothing that rests on the machine's data acts during commissioning, and no limit of a speed that is forced.
 QUIET = {"compensate": 0, "flux_mode": 0, "l_d": 0, "l_q": 0, "lambda_mg": 0}
 OPEN_WIDE = ("omega_trip", "omega_away", "offset_max")  # limits of the motion and of the sensors' zero, not yet known
@@ -179,7 +181,7 @@ class Session:
             if until is not None and until(rows[-1]):
                 break
             if pause_s:
-                self.bus.wait(pause_s)
+                self.pause(pause_s)
         return Seen(self.drive, rows, times)
 
     def snapshot(self) -> dict:
@@ -198,11 +200,20 @@ class Session:
             )
         return row
 
+    def pause(self, seconds: float) -> None:
+        """Wait, and write within the core's heartbeat; a snapshot writes too."""
+        longest = self.drive.protection.heartbeat_s * OF_HEARTBEAT or math.inf
+        while seconds > longest:
+            self.bus.wait(longest)
+            self.bus.write("speed_mode", self.bus.read("speed_mode"))
+            seconds -= longest
+        self.bus.wait(seconds)
+
     def settle(self, seconds: float) -> None:
         """Wait, with a look at the currents every few milliseconds."""
         end = self.bus.now() + seconds
         while self.bus.now() < end:
-            self.bus.wait(min(5e-3, max(end - self.bus.now(), self.t_s)))
+            self.pause(min(LOOK_S, max(end - self.bus.now(), self.t_s)))
             self.snapshot()
 
     def ramp(self, seconds: float, steps: int = 20, **to: tuple[float, float]) -> None:

@@ -32,7 +32,10 @@ from golden_model import fluxproof
 from golden_model.board_registers import board_generics
 from golden_model.drive_keys import DriveError
 from golden_model.io import board_map
+from golden_model.io.fault_latch import NAMES
 from golden_model.registers import registers
+
+HOST_LOST = NAMES.index("host_lost")
 
 
 @dataclass(frozen=True)
@@ -112,6 +115,7 @@ class SimulatedBus:
         )
         self._state, self._random = fluxproof.State(), np.random.default_rng(board.seed)
         self._done, self._due, self._settings = 0, 0.0, None
+        self._written = 0  # period of the last write
 
     @property
     def seconds(self) -> float:
@@ -141,6 +145,7 @@ class SimulatedBus:
 
     def write(self, name: str, value: int) -> None:
         checked(self.board.registers, name, value)
+        self._written = self._done
         if name == "clear_trip":
             self._memory.flags[1:] = 0
             return
@@ -151,6 +156,7 @@ class SimulatedBus:
         self._settings = None
 
     def snapshot(self) -> dict[str, int]:
+        self._written = self._done  # take_snapshot
         self._run(int(self._random.integers(*self.board.host_periods)) + 1)
         return {name: self.read(name) for name in (*CODES, *VALUES, "theta_me")}
 
@@ -172,3 +178,7 @@ class SimulatedBus:
             self._state, self._inputs, self._settings, self._around, self._memory, self._done, periods
         )
         self._done += periods
+        heartbeat, flags = self._values["heartbeat"], self._memory.flags
+        if flags[0] and 0 < heartbeat <= self._done - self._written:
+            flags[2] |= 1 << HOST_LOST
+            flags[1] = 1

@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from fluxproof.commission import alignment, motion, winding, wiring
+from fluxproof.commission import alignment, current_scale, motion, winding, wiring
 from fluxproof.commission.bus import Bus, BusError
-from fluxproof.commission.session import Refusal, Session, Step
+from fluxproof.commission.session import LEAST_HEARTBEAT_S, Refusal, Session, Step
 from golden_model.board_registers import board_generics
 from golden_model.drive import Drive
 from golden_model.registers import registers
@@ -26,16 +26,27 @@ def check_generics(bus: Bus, drive: Drive) -> None:
             )
 
 
+def check_heartbeat(drive: Drive) -> None:
+    """The host looks every few milliseconds; Refusal where the core would not wait as long."""
+    if 0.0 < drive.protection.heartbeat_s < LEAST_HEARTBEAT_S:
+        raise Refusal(
+            f"[protection] heartbeat_s = {drive.protection.heartbeat_s:g}: expected at least {LEAST_HEARTBEAT_S:g} s, "
+            "or none, since commissioning is no real-time program; a shorter one would trip as host_lost"
+        )
+
+
 def commission(
     bus: Bus,
     drive: Drive,
     reverse_given: bool | None = None,
     progress: Callable[[str], None] = lambda text: None,
     done: Callable[[Step], None] = lambda step: None,
+    hold_a: float | None = None,
 ) -> tuple[Drive, list[Step]]:
     """(the drive with the measured values, the steps); Refusal with a reason.
 
     ``reverse_given``: the encoder's direction where the drive file states it.  ``done`` is told each step.
+    ``hold_a``: only a direct current [A] for an ammeter; the drive is then the given one.
     """
     # With one update a period: the equations of a snapshot are those of a voltage that stands a whole period.
     session, steps = Session(bus, replace(drive, core=replace(drive.core, updates_per_period=1)), progress), []
@@ -47,19 +58,25 @@ def commission(
 
     try:
         check_generics(bus, drive)
+        check_heartbeat(drive)
         add(wiring.offsets(session))
         add(wiring.phases(session))
+        if hold_a is not None:
+            add(current_scale.hold(session, hold_a))
+            return drive, steps
         aligned = add(alignment.align(session, reverse_given))
         wound = add(winding.measure(session, aligned.notes["volts_per_a"]))
         moved = add(motion.inertia(session))
         add(motion.magnet(session, moved, wound.values["v_dead"].value))
         add(motion.closed_loop(session))
+        found = _finished(session.drive, drive)
+        add(current_scale.compare(drive, found))
     except BusError as error:
         raise Refusal(str(error)) from None
     finally:
         bus.write("enable", 0)
         bus.write("position_source", 0)
-    return _finished(session.drive, drive), steps
+    return found, steps
 
 
 def _finished(found: Drive, given: Drive) -> Drive:

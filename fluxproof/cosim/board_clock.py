@@ -23,6 +23,7 @@ from golden_model.io.register_map import OKAY, Kind
 from golden_model.kernel import kernel
 
 BUS = 7
+HOST_WRITE = "host_write"  # the strobe of an accepted write
 REFERENCES = ("omega_ref", "i_d_ref", "i_q_ext", "speed_mode", "temp_winding", "temp_valid", "clear_faults")
 # The pins in the order of the blocks' inputs; what is not a pin comes from another block or a register.
 POSITION_PINS = tuple(p.name for p in position_front.BLOCK.inputs[:8])
@@ -271,8 +272,7 @@ class BoardClock:
         self.history: list[tuple[fluxproof.Sample, fluxproof.Observed]] = []  # of the samples
         self._due: list[tuple[int, dict[str, int]]] = []
         self._writes: list[tuple[int, str, int]] = []
-        self._taken: list[tuple[int, str, int]] = []  # registers that change
-        self._stored = False  # a write was accepted: their registers change with the coming clock
+        self._taken: list[tuple[int, str, int]] = []  # registers that change, and host_write with them
 
     def write(self, name: str, value: int, at: int) -> None:
         """A write whose address and data are on the bus at clock ``at``; one at a time, in their order."""
@@ -290,9 +290,8 @@ class BoardClock:
             stops = [when - self.clock for when, *_ in (*self._due, *self._writes, *self._taken) if when > self.clock]
             length = min([len(pins) - at, *stops])
             part = slice(at, at + length)
-            inputs = self.inputs._replace(host_write=int(self._stored))
             self.state, made, entered, wires = run_clocks(
-                self.state, inputs, self._settings(), self._board(), pins[part], self.blocks.core.carrier_half,
+                self.state, self.inputs, self._settings(), self._board(), pins[part], self.blocks.core.carrier_half,
                 self.config, waits, seen[part], status[part],
             )  # fmt: skip
             references = [self.registers.values[name] for name in REFERENCES]
@@ -321,9 +320,13 @@ class BoardClock:
         self._due = [due for due in self._due if due[0] > self.clock]
         taken, self._taken = self._taken, [write for write in self._taken if write[0] > self.clock]
         for when, name, value in taken:
-            register = self.registers.map[name]
             if when > self.clock:
                 continue
+            if name == HOST_WRITE:  # one clock, the first in which the register holds what was written
+                self.inputs = self.inputs._replace(host_write=value)
+                self._taken += [(self.clock + 1, HOST_WRITE, 0)] * value
+                continue
+            register = self.registers.map[name]
             if self.registers.write(register.address, value & 0xFFFFFFFF) != OKAY:
                 raise ValueError(f"{name} = {value} is refused")
             if register.kind is Kind.PULSE and value:
@@ -333,14 +336,12 @@ class BoardClock:
 
     def _take_writes(self) -> bool:
         """Accepts writes whose registers change at the coming clock; True where one waits for the end of a sample."""
-        self._stored = False
         while self._writes and self._writes[0][0] <= self.clock:
             _, name, value = self._writes[0]
             if self.registers.map[name].kind is Kind.SETTING and self.state.of_core.sample_busy:
                 return True
-            self._taken.append((self.clock + 1, name, value))
+            self._taken += [(self.clock + 1, name, value), (self.clock + 1, HOST_WRITE, 1)]
             self._writes.pop(0)
-            self._stored = True
         return False
 
     def _enter(self, w: Wires, references: list[int]) -> None:

@@ -11,9 +11,11 @@ from fluxproof.cosim.closed_loop import Result
 from fluxproof.cosim.driven_plant import Scenario, described_sensors, load_torque
 from fluxproof.plant import (
     FREE,
+    Bus,
     Inverter,
     Machine,
     advance_averaged,
+    advance_bus,
     advance_switching,
     centred_gates,
     half_gates,
@@ -39,7 +41,7 @@ class Stimulus(NamedTuple):
     """What n periods are given."""
 
     samples: np.ndarray  # (n, 8) int64: the fields of fluxproof.Sample after the codes
-    u_dc: np.ndarray  # (n,) V
+    u_dc: np.ndarray  # (n,) V, of the source
     load: np.ndarray  # (n,) Nm; with an imposed speed rad/s
     brake: np.ndarray  # (n,) Nm, against the rotation
 
@@ -57,6 +59,8 @@ class Bench(NamedTuple):
     levels: np.ndarray  # (3,) as half_gates
     waits: np.ndarray  # (3,) s, as half_gates
     free: bool  # False: the speed is imposed
+    bus: Bus
+    u_dc: np.ndarray  # (1,) V, of the bus
 
 
 @kernel
@@ -108,8 +112,10 @@ def run_averaged(state, references, u_dc, load, registers, config, plant_state, 
     return state
 
 
+IDEAL = Bus()
 PROGRESS_PERIODS = 5000  # a tenth of a second
-PLANT = ("i_d", "i_q", "lambda_d", "lambda_q", "omega_m", "torque")
+# power into the motor, brake_power in the brake resistor: means of the period that follows
+PLANT = ("i_d", "i_q", "lambda_d", "lambda_q", "omega_m", "torque", "u_dc", "power", "brake_power")
 
 
 @mixed_kernel
@@ -118,7 +124,7 @@ def run_switching(state, stimulus, bench, first, out, observed):
 
     ``stimulus``: Stimulus of n periods; ``bench``: Bench.  ``first``: number of the first period, for the sensors'
     noise, and with double_update for the half: even ones rise.
-    ``out`` (n, 6) receives the signals of PLANT before each period, ``observed`` the core's.
+    ``out`` (n, 9) receives the signals of PLANT before each period, ``observed`` the core's.
     """
     b, plant_state, sensors = bench, bench.plant_state, bench.sensors
     duties = np.zeros(3)
@@ -126,7 +132,9 @@ def run_switching(state, stimulus, bench, first, out, observed):
         out[k, 0], out[k, 1] = plant_state[L.I_D], plant_state[L.I_Q]
         out[k, 2], out[k, 3] = plant_state[L.LAMBDA_D], plant_state[L.LAMBDA_Q]
         out[k, 4], out[k, 5] = plant_state[L.OMEGA_M], plant_state[L.TORQUE]
-        given, u_dc = stimulus.samples[k], stimulus.u_dc[k]
+        given = stimulus.samples[k]
+        u_dc = b.u_dc[0] if b.bus.capacitance > 0.0 else stimulus.u_dc[k]
+        out[k, 6] = u_dc
         sample = fluxproof.Sample(
             adc_a=current_code(sensors, 0, plant_state[L.I_A], first + k),
             adc_b=current_code(sensors, 1, plant_state[L.I_B], first + k),
@@ -159,18 +167,22 @@ def run_switching(state, stimulus, bench, first, out, observed):
         if b.free:
             pull = load_torque(pull, stimulus.brake[k], plant_state[L.OMEGA_M])
         advance_switching(plant_state, b.plant_params, times, words, u_dc, pull, b.period_s, -1.0)
+        brake = state.of_brake_chopper.brake
+        out[k, 7], out[k, 8] = plant_state[L.P_IN], brake * u_dc * u_dc / b.bus.brake_ohm
+        b.u_dc[0] = advance_bus(u_dc, b.bus, stimulus.u_dc[k], plant_state[L.P_IN], brake, b.period_s)
     return state
 
 
 def simulate(
     drive, register_set, scenario: Scenario, machine=None, sensors=None, dead_time_s=0.0, mode=FREE, state=None,
-    inverter=None, progress=None,
+    inverter=None, progress=None, bus=IDEAL,
 ) -> Result:  # fmt: skip
     """``scenario`` with the golden model and the switching plant, compiled; as cosim.cosimulate, but faster.
 
     The inverter follows the compare values in force with a dead time of ``dead_time_s``; zero is the ideal inverter
     that paper 001 assumes; ``inverter`` adds device drops.  ``state`` is the controller's initial state; the result has
     the last one.  ``mode`` IMPOSED_SPEED: the scenario's load is the mechanical speed [rad/s].
+    ``bus``: what is between the source, whose voltage is the scenario's u_dc, and the inverter.
     ``progress``, if given, is called with the periods done and their number, every PROGRESS_PERIODS.
     """
     machine = machine or Machine.from_mapping(vars(drive.machine))
@@ -201,6 +213,8 @@ def simulate(
         levels=np.zeros(3),
         waits=np.full(3, float(dead_time_s)),
         free=mode == FREE,
+        bus=bus,
+        u_dc=np.array([float(scenario.u_dc[0])]),
     )
     shown = set() if progress is None else set(range(0, n, PROGRESS_PERIODS))
     ends = [*sorted((set(scenario.changes) | shown) - {0}), n]

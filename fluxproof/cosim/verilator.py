@@ -80,7 +80,8 @@ def _defines(names: Iterable[str]) -> list[str]:
     """What verilated.cpp must know of a top with these ports."""
     valids = ["-DCORE_SHOWS_VALIDS"] if {"duty_valid", "values_valid"} <= set(names) else []
     gates = ["-DCORE_HAS_GATES"] if {"gate_high", "gate_low", "sample_valid", "sample_trigger"} <= set(names) else []
-    return [f"-DCORE_CLOCK={clock_of(names)}", *valids, *gates]
+    trip = ["-DCORE_HAS_ASYNC"] if {"trip", "aresetn"} <= set(names) else []  # io/power_stage
+    return [f"-DCORE_CLOCK={clock_of(names)}", *valids, *gates, *trip]
 
 
 def clock_of(names: Iterable[str]) -> str:

@@ -8,6 +8,7 @@ project: it models the hardware.
 
 from fluxproof.plant import layout
 from fluxproof.plant.averaged import advance_averaged, skewed_currents
+from fluxproof.plant.bus import Bus, advance_bus
 from fluxproof.plant.drive_plant import AveragedPlant, SwitchingPlant, initial_state, plant_params
 from fluxproof.plant.flux_map import FluxMap
 from fluxproof.plant.inverter import Inverter, averaged_leg_voltage
@@ -33,6 +34,7 @@ __all__ = [
     "RISING",
     "STATE_SIZE",
     "AveragedPlant",
+    "Bus",
     "FluxMap",
     "Harmonic",
     "Inverter",
@@ -42,6 +44,7 @@ __all__ = [
     "Sensors",
     "SwitchingPlant",
     "advance_averaged",
+    "advance_bus",
     "advance_switching",
     "averaged_leg_voltage",
     "centred_gates",

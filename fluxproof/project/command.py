@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import argparse
 import re
+import sys
 from pathlib import Path
 
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis.whole_drive import load_drive
 from fluxproof.files import refuse_overwriting, write_text
-from fluxproof.project import parts, render
+from fluxproof.project import need, parts, render
 from fluxproof.quote import say, shown
 from fluxproof.stage import together
 from golden_model.board_registers import board_set, has_board
@@ -52,6 +53,8 @@ def run(args: argparse.Namespace) -> int:
             write_text(stage / name, text)
     for name in found:
         say(str(folder / name))
+    fits, words = need.judged(drive, part)
+    say(words if fits else f"fluxproof: {args.drive}: {words}", sys.stdout if fits else sys.stderr)
     if processor is None:
         say(f"no device tree: {part} has no processor; the script builds the core alone")
     elif has_board(drive):

@@ -21,7 +21,8 @@ WINDOW = 0x1000  # bytes of the registers' address range
 def generics(drive: Drive, register_set: RegisterSet) -> dict[str, int]:
     """The generics of the top, by their names in the VHDL."""
     chosen = board_generics(drive) if has_board(drive) else {}
-    named = register_set.config._asdict() | chosen
+    levels = {name: getattr(drive.core, name) for name in ("gate_active", "trip_active", "brake_active")}
+    named = register_set.config._asdict() | levels | chosen
     return {"CLOCK_HZ": round(drive.core.clock_hz), **{name.upper(): value for name, value in named.items()}}
 
 
@@ -99,7 +100,11 @@ def _alone(values: dict[str, int], name: str) -> list[str]:
         "read_xdc -mode out_of_context [file join $here fluxproof_clock.xdc]",
         f"synth_design -top {name} -part $part -mode out_of_context -generic [list {names}]",
         "read_xdc [file join $core scripts vivado fluxproof.xdc]",
-        *(["read_xdc [file join $core scripts vivado fluxproof_board.xdc]"] if name == "fluxproof_board" else []),
+        *(
+            f"{command} [file join $core scripts vivado {file}]"
+            for command, file in (("read_xdc", "fluxproof_board.xdc"), ("source", "board_pins.tcl"))
+            if name == "fluxproof_board"
+        ),
         "opt_design",
         "place_design",
         "route_design",

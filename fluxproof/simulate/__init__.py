@@ -3,7 +3,8 @@
 
 scene      what happens when: start, speed step, load step, reversal
 run        the golden core on the switching plant; a trip turns the gates off
-margins    phase and gain margin of both loops, delay and sampling included
+margins    phase and gain margin of the loops, delay, sampling and the turning rotor included
+regeneration  what braking feeds back, and what the bus needs for it
 ripple     the current inside PWM periods
 figures    what the runs and the data say, as numbers
 verdict    whether the drive is fit to be built, and why not

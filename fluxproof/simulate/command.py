@@ -62,13 +62,21 @@ def summary(data: dict) -> list[str]:
         lines.append(f"  {name}: crossover, phase and gain margin {said}")
     told = {
         "Speed": ("speed_overshoot", "load_dip", "load_recovery"),
-        "Currents": ("current_overshoot", "peak_current", "ripple_peak_to_peak"),
+        "Currents": ("current_overshoot", "current_overshoot_at_top_speed", "peak_current", "ripple_peak_to_peak"),
         "Voltage and power": ("voltage_margin_at_rated_point", "power_fed_back_peak"),
+        "Supply": (
+            "energy_fed_back_at_once",
+            "bus_voltage_highest",
+            "bus_voltage_on_its_capacitor_alone",
+            "brake_resistor_at_most",
+            "brake_resistor_on_from",
+        ),
         "Heat": ("copper_loss_at_rated_current",),
     }
     for group, names in told.items():
         if group in data["figures"]:
-            shown = ((name.replace("_", " "), data["figures"][group][name]) for name in names)
+            found = data["figures"][group]
+            shown = ((name.replace("_", " "), found[name]) for name in names if name in found)
             lines.append("  " + ", ".join(f"{name} {_value(f)}" for name, f in shown))
     lines.append(f"  not modelled: {'; '.join(line.split(':')[0] for line in data['not_modelled'])}")
     return lines

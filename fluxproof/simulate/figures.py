@@ -13,8 +13,10 @@ import numpy as np
 
 from fluxproof.cosim.scenarios import RPM
 from fluxproof.simulate import scene as scenes
+from fluxproof.simulate.regeneration import Regeneration
 from fluxproof.simulate.run import Run
 from fluxproof.simulate.scene import Stage
+from golden_model import supply
 from golden_model.drive import Drive
 
 TAIL = 0.15  # of a stage, at its end: what must have settled
@@ -68,8 +70,8 @@ def of_currents(run: Run) -> dict:
     return found
 
 
-def of_current_step(run: Run) -> dict:
-    """Overshoot and rise of the step of i_q on the driven shaft."""
+def of_current_step(run: Run, where: str = "") -> dict:
+    """Overshoot and rise of the step of i_q on the driven shaft; ``where``: the end of the figures' names."""
     stage = run.scene.stage("current step")
     i_q, size = run["i_q"][stage.first : stage.end], stage.reference
     before = run["i_q"][stage.first - 50 : stage.first].mean()
@@ -77,10 +79,10 @@ def of_current_step(run: Run) -> dict:
     period = run.t[1] - run.t[0]
     first = np.flatnonzero(made >= 0.9)
     return {
-        "current_step": figure(size, "A", "calculated"),
-        "current_overshoot": figure(100.0 * max(made.max() - 1.0, 0.0), "%"),
-        "current_rise_to_90_percent": figure(first[0] * period * 1e6 if len(first) else None, "µs"),
-        "current_settled_noise": figure(np.std(i_q[-100:]), "A rms"),
+        f"current_step{where}": figure(size, "A", "calculated"),
+        f"current_overshoot{where}": figure(100.0 * max(made.max() - 1.0, 0.0), "%"),
+        f"current_rise_to_90_percent{where}": figure(first[0] * period * 1e6 if len(first) else None, "µs"),
+        f"current_settled_noise{where}": figure(np.std(i_q[-100:]), "A rms"),
     }
 
 
@@ -97,10 +99,31 @@ def of_voltage(drive: Drive, run: Run) -> dict:
     found["voltage_margin_at_rated_point"] = figure(100.0 * (1.0 - need / limit), "%", "calculated")
     found["speed_at_full_voltage_rated_current"] = figure(scenes.reach(drive, current) / RPM, "rpm", "calculated")
     found["speed_at_full_voltage_no_load"] = figure(scenes.reach(drive, 0.0) / RPM, "rpm", "calculated")
-    power = 1.5 * (run["u_d"] * run["i_d"] + run["u_q"] * run["i_q"])
-    back = np.minimum(power, 0.0)
+    back = np.minimum(run["true_power"], 0.0)
     found["power_fed_back_peak"] = figure(-back.min(), "W")
     found["energy_fed_back"] = figure(-back.sum() * (run.t[1] - run.t[0]), "J")
+    return found
+
+
+def of_supply(drive: Drive, run: Run, back: Regeneration) -> dict:
+    """The bus in the run, what braking gives back, and what a chopper needs."""
+    volts, period = run["true_u_dc"], run.t[1] - run.t[0]
+    braked = run["true_brake_power"]
+    found = {
+        "bus_voltage_highest": figure(volts.max(), "V"),
+        "bus_voltage_lowest": figure(volts.min(), "V"),
+        "energy_fed_back_at_once": figure(back.energy_j, "J"),
+    }
+    if drive.supply.source != "ideal":
+        found["bus_voltage_on_its_capacitor_alone"] = figure(back.volts, "V", "calculated")
+    if drive.supply.source == "diode":
+        ohm = back.resistor_ohm if math.isfinite(back.resistor_ohm) else None
+        found["brake_resistor_at_most"] = figure(ohm, "ohm", "calculated")
+        found["brake_resistor_on_from"] = figure(back.on_v, "V", "calculated")
+    if drive.protection.brake_on_v is not None:
+        found["brake_resistor"] = figure(supply.brake_resistor_ohm(drive), "ohm", "calculated")
+        found["brake_resistor_energy"] = figure(braked.sum() * period, "J")
+        found["brake_resistor_power_peak"] = figure(braked.max(), "W")
     return found
 
 

@@ -18,7 +18,7 @@ without it.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -58,6 +58,7 @@ class Loop:
     denominator: np.ndarray
     t_s: float
     lead_s: float = 0.0
+    both: bool = False  # complex coefficients: negative frequencies differ
 
     def frequencies(self) -> np.ndarray:
         """From a hundred-thousandth of the Nyquist frequency up to it [Hz]."""
@@ -86,6 +87,29 @@ def current_loop(drive: Drive, register_set: RegisterSet, axis: str) -> Loop:
     return Loop(numerator, denominator, t_s, drive.sampling.delay_s)
 
 
+def turning_current_loop(drive: Drive, register_set: RegisterSet, omega_m: float) -> Loop:
+    """The open current loop as a rotor that turns by phi = omega*T a sample sees it: complex, both axes at once.
+
+        i[k+2] = a*exp(-j*phi)*i[k+1] + b*exp(-j*phi/2)*u[k],    b = (1 - a)/R
+        u[k] = C*(ref - i[k]) + j*omega_chord*L*i[k]
+
+    The voltage stands in the stator's frame for a period while the rotor turns on, and the decoupling acts one period
+    late: at few samples a turn both take phase that the loops of the single axes do not show.  L and the gains are
+    the means of both axes.  A complex loop has other margins at negative frequencies, which `margins` looks at.
+    """
+    t_s, m = drive.sample_time_s, drive.machine
+    gains = {row.name: row.represented for row in register_set.rows}
+    kp, ki = (0.5 * (gains[f"{name}_d"] + gains[f"{name}_q"]) for name in ("kp", "ki"))
+    henry, ohm = 0.5 * (m.inductance_d_h + m.inductance_q_h), m.resistance_ohm
+    phi = m.pole_pairs * omega_m * t_s
+    decay = np.exp(-ohm * t_s / henry)
+    b = (1.0 - decay) / ohm * np.exp(-0.5j * phi)
+    chord = phi / t_s * (1.0 - phi * phi / 24.0)
+    plant = np.polyadd([1.0, -decay * np.exp(-1j * phi), 0.0], [-1j * chord * henry * b])
+    numerator = np.polymul([kp + ki * t_s, -kp], [b])
+    return Loop(numerator, np.polymul([1.0, -1.0], plant), t_s, drive.sampling.delay_s, both=True)
+
+
 def speed_loop(drive: Drive, register_set: RegisterSet) -> Loop | None:
     """The open speed loop, or None if its gain is zero."""
     t_s, m = drive.sample_time_s, drive.machine
@@ -110,7 +134,16 @@ def speed_loop(drive: Drive, register_set: RegisterSet) -> Loop | None:
 def margins(loop: Loop) -> Margins:
     """Margins at all crossings: the smallest phase margin, the smallest gain margin above 0 dB."""
     hz = loop.frequencies()
-    gain = loop.response(hz)
+    found = _margins(loop, hz, loop.response(hz))
+    if not loop.both:
+        return found
+    other = _margins(loop, hz, np.conj(loop.response(-hz)))
+    closest = min((found, other), key=lambda m: np.inf if m.phase_margin_deg is None else m.phase_margin_deg)
+    gains = [m.gain_margin_db for m in (found, other) if m.gain_margin_db is not None]
+    return replace(closest, gain_margin_db=min(gains, default=None))
+
+
+def _margins(loop: Loop, hz: np.ndarray, gain: np.ndarray) -> Margins:
     size, phase = np.log(np.abs(gain)), np.unwrap(np.angle(gain))
     phase -= 2.0 * np.pi * np.round((phase[0] + np.pi / 2.0) / (2.0 * np.pi))  # an integrator starts at -90 or -180
     crossings = [(_at(hz, size, k), _at(phase, size, k)) for k in np.flatnonzero(np.diff(np.sign(size)))]

@@ -51,7 +51,7 @@ def _period(drive, run, k, machine, params):
     )  # fmt: skip
     t = np.linspace(0.0, period_s, PROBES)
     i_abc = np.empty((PROBES, 3))
-    u_dc = float(run.scene.scenario.u_dc[k])
+    u_dc = float(run["true_u_dc"][k])
     for n, instant in enumerate(t):
         state = start.copy()
         advance_switching(state, params, times, words, u_dc, load, period_s, float(instant))

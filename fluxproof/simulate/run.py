@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fluxproof.cosim.golden_loop import simulate
-from fluxproof.plant import FREE, IMPOSED_SPEED, Inverter, Machine
+from fluxproof.plant import FREE, IMPOSED_SPEED, Bus, Inverter, Machine
 from fluxproof.simulate.scene import Scene
+from golden_model import supply
 from golden_model.drive import Drive
 from golden_model.io.fault_latch import NAMES
 from golden_model.registers import RegisterSet
@@ -47,6 +48,14 @@ def inverter_of(drive: Drive) -> Inverter:
     """Device drops; the dead time is in the gates."""
     i = drive.inverter
     return Inverter(0.0, i.v_switch_v, i.v_diode_v, i.r_switch_ohm, i.r_diode_ohm)
+
+
+def bus_of(drive: Drive) -> Bus:
+    """The bus that [supply] describes."""
+    if drive.supply.source == "ideal":
+        return Bus()
+    farad, diode = drive.supply.capacitance_f, drive.supply.source == "diode"
+    return Bus(farad, supply.resistance_ohm(drive), diode, supply.brake_resistor_ohm(drive))
 
 
 def run(
@@ -86,4 +95,5 @@ def _simulate(drive, register_set, scene, progress):
         mode=IMPOSED_SPEED if scene.imposed else FREE,
         inverter=inverter_of(drive),
         progress=progress,
+        bus=bus_of(drive),
     )

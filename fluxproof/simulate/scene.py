@@ -26,6 +26,7 @@ MOST_PERIODS = 1_000_000  # about half a minute of computing
 SETTLE = 30.0  # over the crossover of the speed loop [rad/s]: six time constants of its integral
 STEP_SAMPLES = 300  # before and after the step of the current
 STEP_OF_LIMIT = 0.3
+OF_STEP = 0.7  # of the speed at which the step's current fills the voltage circle: the rest makes the step
 
 
 @dataclass(frozen=True)
@@ -152,7 +153,22 @@ def torque_scene(drive: Drive) -> Scene:
 
 def current_step(drive: Drive) -> Scene:
     """A step of i_q in torque mode on a shaft that is driven at the low speed."""
-    speed = LOW * min(TOP * drive.machine.rated_speed_rad_s, reach(drive, drive.current_limit_a)) / TOP
+    return _current_step(
+        drive, LOW * min(TOP * drive.machine.rated_speed_rad_s, reach(drive, drive.current_limit_a)) / TOP
+    )
+
+
+def fast_current_step(drive: Drive) -> Scene:
+    """The same at rated speed, or where the voltage lets the step pass: the delay turns the axes into each other."""
+    return _current_step(drive, fastest(drive))
+
+
+def fastest(drive: Drive) -> float:
+    """Mechanical speed of the step at the top [rad/s]."""
+    return min(drive.machine.rated_speed_rad_s, OF_STEP * reach(drive, STEP_OF_LIMIT * drive.current_limit_a))
+
+
+def _current_step(drive: Drive, speed: float) -> Scene:
     size = STEP_OF_LIMIT * drive.current_limit_a
     i_q = np.repeat([0.0, size], STEP_SAMPLES)
     driven = replace(_driven(drive, np.full(len(i_q), speed), i_q), omega_m=speed)

@@ -4,16 +4,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from fluxproof.simulate import figures, page, verdict
-from fluxproof.simulate.margins import current_loop, margins, speed_loop
+from fluxproof.simulate.margins import current_loop, margins, speed_loop, turning_current_loop
+from fluxproof.simulate.regeneration import Regeneration, regeneration, told
 from fluxproof.simulate.ripple import ripple
 from fluxproof.simulate.run import Run, run
-from fluxproof.simulate.scene import current_step, main_scene
+from fluxproof.simulate.scene import current_step, fast_current_step, fastest, main_scene
 from golden_model.drive import Drive
-from golden_model.registers import registers
+from golden_model.registers import RegisterSet, registers
 
 
 def simulate(
@@ -27,8 +29,10 @@ def simulate(
     scene = main_scene(drive)
     say("compiling")
     step = run(drive, register_set, current_step(drive))
+    fast = run(drive, register_set, fast_current_step(drive))
     main = run(drive, register_set, scene, lambda done, total: say(f"{100 * done // total} %"))
     loops = {f"current loop, {axis} axis": current_loop(drive, register_set, axis) for axis in "dq"}
+    loops["current loop, top speed"] = turning_current_loop(drive, register_set, fastest(drive))
     outer = speed_loop(drive, register_set)
     if outer is not None:
         loops["speed loop"] = outer
@@ -36,7 +40,10 @@ def simulate(
     say("ripple")
     loaded = main.scene.stages[2]
     rippled = ripple(drive, main, loaded.end, _turn(drive, main, loaded.end))
-    status, reason = verdict.judge(drive, found, [step, main])
+    back = regeneration(drive, _untripped(drive, register_set, main))
+    status, reason = verdict.judge(drive, found, [step, fast, main])
+    if status == "tripped" and "u_dc_high" in main.faults:
+        reason = f"{reason}: {told(drive, back)}"
     data = {
         "drive": name,
         "status": status,
@@ -44,7 +51,7 @@ def simulate(
         "reference_unit": "A" if scene.imposed else "rpm",
         "scene": [_stage(drive, stage) for stage in scene.stages],
         "margins": {loop: value.to_json() for loop, value in found.items()},
-        "figures": _figures(drive, main, step, rippled),
+        "figures": _figures(drive, (main, step, fast), rippled, back),
         "modelled": verdict.modelled(drive, [main]),
         "not_modelled": verdict.not_modelled(drive, [main], plant),
     }
@@ -58,10 +65,20 @@ def simulate(
     return data, pages
 
 
-def _figures(drive: Drive, main: Run, step: Run, rippled: dict) -> dict:
+def _untripped(drive: Drive, register_set: RegisterSet, main: Run) -> Run:
+    """The run, or one on an ideal bus where the bus has tripped: what braking would feed back."""
+    if "u_dc_high" not in main.faults:
+        return main
+    return run(replace(drive, supply=replace(drive.supply, source="ideal")), register_set, main_scene(drive))
+
+
+def _figures(drive: Drive, runs: tuple[Run, Run, Run], rippled: dict, back: Regeneration) -> dict:
+    main, step, fast = runs
     groups = {} if main.scene.imposed else {"Speed": figures.of_speed(main)}
-    groups["Currents"] = figures.of_current_step(step) | figures.of_currents(main) | figures.of_ripple(rippled)
+    steps = figures.of_current_step(step) | figures.of_current_step(fast, "_at_top_speed")
+    groups["Currents"] = steps | figures.of_currents(main) | figures.of_ripple(rippled)
     groups["Voltage and power"] = figures.of_voltage(drive, main)
+    groups["Supply"] = figures.of_supply(drive, main, back)
     groups["Heat"] = figures.of_heat(drive, main)
     return groups
 

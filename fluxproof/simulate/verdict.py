@@ -11,6 +11,7 @@ import numpy as np
 from fluxproof.simulate.figures import rpm, tail
 from fluxproof.simulate.margins import Margins
 from fluxproof.simulate.run import Run
+from golden_model import supply
 from golden_model.drive import Drive
 from golden_model.scaling import leg_loss_v
 
@@ -89,10 +90,26 @@ def modelled(drive: Drive, runs: list[Run]) -> list[str]:
         lines.append(f"position in counts: {drive.encoder.counts} a turn, from the start referenced")
     else:
         lines.append(f"position in codes of {drive.sensors.position_bits} bits")
+    lines.append(_bus(drive))
     saturates = any((m.saturation_d_per_a2, m.saturation_q_per_a2, m.cross_saturation_wb_per_a2))
     lines.append("saturation as given" if saturates else "constant inductances: [machine] gives no saturation")
     lines.append("protection: the checks of each sample; a trip turns the gates off")
     return lines
+
+
+def _bus(drive: Drive) -> str:
+    """The bus in words."""
+    if drive.supply.source == "ideal":
+        return f"bus: an ideal source of {drive.inverter.dc_bus_v:g} V, which takes back what braking feeds back"
+    back = "which takes nothing back" if drive.supply.source == "diode" else "which takes back what braking feeds back"
+    kind = "a source behind a diode" if drive.supply.source == "diode" else "a battery"
+    brake = "no brake resistor"
+    if drive.protection.brake_on_v is not None:
+        brake = f"a brake resistor of {supply.brake_resistor_ohm(drive):.3g} ohm"
+    return (
+        f"bus: {drive.supply.capacitance_f * 1e3:.3g} mF on {kind} of {drive.inverter.dc_bus_v:g} V and "
+        f"{supply.resistance_ohm(drive):.3g} ohm, {back}; {brake}"
+    )
 
 
 def not_modelled(drive: Drive, runs: list[Run], plant: Sequence[str] = ()) -> list[str]:
@@ -100,7 +117,7 @@ def not_modelled(drive: Drive, runs: list[Run], plant: Sequence[str] = ()) -> li
     lines = [
         "heating: winding and magnets keep their temperatures; losses are reported, temperatures are not computed",
         "switching losses and the temperature of the inverter",
-        "the bus: an ideal source at the nominal voltage; what is fed back at braking raises no voltage here",
+        "losses of the inverter on the bus, and what else hangs on it",
         "noise, offset and gain errors of sensors; delays of drivers; the angle error of the encoder's mounting",
         "cogging, harmonics of the magnets, elasticity and backlash of the shaft",
         "watchdog and too early samples: every sample comes in time",

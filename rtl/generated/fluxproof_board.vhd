@@ -26,6 +26,9 @@ entity fluxproof_board is
     POSITION_BITS : integer range 8 to 18        := 16;  -- width of the position code
     CARRIER_HALF  : integer range 8 to 32767     := 10000;  -- half a PWM period in clocks
     ESTIMATORS    : integer range 0 to 1         := 1;  -- 0 leaves the estimators out
+    GATE_ACTIVE   : integer range 0 to 1         := 1;  -- level of gate_high and gate_low at which a switch is on
+    TRIP_ACTIVE   : integer range 0 to 1         := 1;  -- level of trip that turns the gates off
+    BRAKE_ACTIVE  : integer range 0 to 1         := 1;  -- level of brake at which the resistor is on
     ENCODER       : integer range 0 to 6         := 1;  -- the kind of encoder, see above
     CURRENTS      : integer range 0 to 3         := 1;  -- the kind of converter, see above
     SPI_LINES     : integer range 1 to 4         := 4  -- data lines of the SPI converters
@@ -86,7 +89,7 @@ entity fluxproof_board is
     code_b_in      : in  std_logic_vector(ADC_BITS - 1 downto 0);
     code_c_in      : in  std_logic_vector(ADC_BITS - 1 downto 0);
     code_u_dc_in   : in  std_logic_vector(ADC_BITS - 1 downto 0);
-    trip           : in  std_logic;  -- asynchronous, 1: gates off without a clock, remembered
+    trip           : in  std_logic;  -- asynchronous, TRIP_ACTIVE: gates off without a clock, remembered
     gate_high      : out std_logic_vector(2 downto 0);  -- upper gates, bit 0 is leg a
     gate_low       : out std_logic_vector(2 downto 0);  -- lower gates, bit 0 is leg a
     brake          : out std_logic;  -- brake resistor on
@@ -176,6 +179,7 @@ architecture rtl of fluxproof_board is
   signal running           : std_logic;
   signal tripped           : std_logic;
   signal sample_busy       : std_logic;
+  signal brake_next        : std_logic;
   signal fault_flags       : unsigned(14 downto 0);
   signal first_fault       : unsigned(14 downto 0);
   signal early_samples     : unsigned(7 downto 0);
@@ -427,7 +431,7 @@ begin
       running         => running,
       tripped         => tripped,
       sample_busy     => sample_busy,
-      brake           => brake,
+      brake           => brake_next,
       fault_flags     => fault_flags,
       first_fault     => first_fault,
       early_samples   => early_samples,
@@ -478,6 +482,11 @@ begin
     );
 
   stage : entity work.power_stage
+    generic map (
+      GATE_ACTIVE  => GATE_ACTIVE,
+      TRIP_ACTIVE  => TRIP_ACTIVE,
+      BRAKE_ACTIVE => BRAKE_ACTIVE
+    )
     port map (
       clk            => aclk,
       rst            => rst,
@@ -485,10 +494,12 @@ begin
       gate_high_next => gate_high_next,
       gate_low_next  => gate_low_next,
       trigger_next   => trigger_next,
+      brake_next     => brake_next,
       trip           => trip_now,
       gate_high      => gate_high,
       gate_low       => gate_low,
-      sample_trigger => sample_trigger
+      sample_trigger => sample_trigger,
+      brake          => brake
     );
 
   position : entity work.position_front

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`make mutate`: draws mutants of every block and of the core's wiring; their benches must notice them.
+"""`make mutate`: draws mutants of every block and of the wiring of core and board; their benches must notice them.
 
 Writes build/mutate/result.json.  Exit status 1 if less than 99.5 % of the mutants that are not proved equivalent are
 noticed, or if one of the others has no reason (scripts/mutate/table.py), or if a defect of the short list in the VHDL
@@ -14,18 +14,24 @@ import sys
 import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, as_completed
+from datetime import date
 
 from fluxproof.cosim.verilog import NoUsableGhdl, find_ghdl
 from fluxproof.files import write_json
 from scripts.mutate import defects
+from scripts.mutate.board import RUNS
 from scripts.mutate.equivalent import DIFFERENT, EQUIVALENT, UNKNOWN
 from scripts.mutate.judge import KILLED, Verdicts, judge, processor_s
-from scripts.mutate.subject import FOLDER, Core, Subject, subjects
+from scripts.mutate.subject import FOLDER, Board, Core, Subject, subjects
 from scripts.mutate.table import reason
 
-SEED = 1
 ENOUGH = 0.995  # of those not proved equivalent
 COUNTED = ("mutants", "killed", "equivalent", "survivors", "without_reason")
+
+
+def seed_of(day: date) -> int:
+    """20261128 for that day: every day draws others, so that no bench is made for one draw."""
+    return 10000 * day.year + 100 * day.month + day.day
 
 
 def block_of(verdicts: Verdicts) -> str:
@@ -76,13 +82,15 @@ def line_of(verdicts: Verdicts) -> str:
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="mutate", description=__doc__.splitlines()[0])
-    only_says = "these blocks alone, with commas between; fluxproof is the core's wiring"
+    only_says = "these blocks alone, with commas between; fluxproof is the core's wiring, fluxproof_board the board's"
     parser.add_argument("--only", default="", metavar="BLOCKS", help=only_says)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="subjects in parallel")
-    parser.add_argument("--seed", type=int, default=SEED, help="of the draw")
+    parser.add_argument("--seed", type=int, default=seed_of(date.today()), help="of the draw; default the date")
     arguments = parser.parse_args()
+    print(f"seed {arguments.seed}", flush=True)
     only = set(filter(None, arguments.only.split(",")))
-    chosen: list[Subject | Core] = [s for s in (Core(), *subjects()) if not only or s.of in only]
+    everything: list[Subject | Core | Board] = [Core(), *(Board(k) for k in range(len(RUNS))), *subjects()]
+    chosen = [s for s in everything if not only or s.of in only]
     if wrong := only - {s.of for s in chosen}:
         parser.error(f"--only: no block {', '.join(sorted(wrong))}")
     try:

@@ -2,7 +2,7 @@
 """Defects planted by hand in copies of the VHDL, for what no netlist of one configuration shows, or no block's bench.
 
 They are in generics and functions that run at elaboration, in the register bus, in the asynchronous path of
-power_stage, and in the wiring of the AXI top; the tests of pytest judge them.
+power_stage, and in the wiring of both tops; the tests of pytest judge them.
 """
 
 from __future__ import annotations
@@ -44,12 +44,20 @@ DEFECTS = (
     Defect("unaligned address taken", "io/register_access.vhd", "address(1 downto 0) = 0 and ", ""),
     Defect("setting counts inside a sample", "generated/register_file.vhd", "(row(2) and column(4) and not sample_busy)", "(row(2) and column(4))"),
     Defect("old values read after reset", "generated/register_file.vhd", "        written                   <= (others => '0');\n", ""),
-    Defect("short trip forgotten", "io/power_stage.vhd", "    if trip_pin = '1' then", "    if trip_pin = '1' and rising_edge(clk) then"),
+    Defect("short trip forgotten", "io/power_stage.vhd", "    if trip_on = '1' then", "    if trip_on = '1' and rising_edge(clk) then"),
     Defect("gates let go before the core knows", "io/power_stage.vhd", "if sync_2 = '1' or rst = '1' then", "if sync_1 = '1' or rst = '1' then"),
     Defect("trip kept for ever", "io/power_stage.vhd", "if sync_2 = '1' or rst = '1' then", "if rst = '1' then"),
     Defect("one synchroniser stage", "io/power_stage.vhd", "trip <= sync_2;", "trip <= sync_1;"),
     Defect("upper and lower gates swapped", "generated/fluxproof_axi.vhd", "gate_high_next => gate_high_next,", "gate_high_next => gate_low_next,"),
     Defect("registers change in mid-sample", "generated/fluxproof_axi.vhd", "sample_busy       => sample_busy,", "sample_busy       => '0',"),
+    Defect("the host is never missed", "generated/fluxproof_axi.vhd", "      host_write      => host_write,", "      host_write      => '1',"),
+    Defect("the host of a board is never missed", "generated/fluxproof_board.vhd", "      host_write      => host_write,", "      host_write      => '1',"),
+    Defect("faults of the board do not trip", "generated/fluxproof_board.vhd", "  core_trip <= trip_now or board_stop;", "  core_trip <= trip_now;"),
+    Defect("every fault of the board ignored", "generated/fluxproof_board.vhd", "      board_ignore   => board_ignore,", "      board_ignore   => \"111\","),
+    Defect("limits of the fast overcurrent swapped", "generated/fluxproof_board.vhd",
+           "      limit_high        => limit_high,\n      limit_low         => limit_low,\n      adc_a", "      limit_high        => limit_low,\n      limit_low         => limit_high,\n      adc_a"),
+    Defect("two faults of the board swapped", "generated/fluxproof_board.vhd",
+           "      index_wrong    => index_wrong,\n      position_lost  => position_lost,\n", "      index_wrong    => position_lost,\n      position_lost  => index_wrong,\n"),
 )
 # fmt: on
 
@@ -60,7 +68,11 @@ TESTS = {
         ["cocotb_tests/blocks/test_registers_axi.py::test_axi_slave_equals_its_twin"],
     ),
     "power_stage": ["cocotb_tests/blocks/test_power_stage.py"],
-    "fluxproof_axi": ["cocotb_tests/core/test_axi_top.py"],
+    "fluxproof_axi": [
+        "cocotb_tests/core/test_axi_top.py",
+        "cocotb_tests/core/test_bring_up.py::test_the_program_writes_within_its_own_heartbeat",
+    ],
+    "fluxproof_board": ["cocotb_tests/board/test_closed_loop.py::test_every_fault_of_the_board_through_the_pins"],
 }
 WHY = re.compile(r"^E\s+(?:AssertionError: )?(.*\S)", re.MULTILINE)
 

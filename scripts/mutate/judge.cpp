@@ -66,9 +66,9 @@ int64_t judge(int64_t mutant, int seed, int64_t before, int64_t clocks, const Ro
     top->mutant = mutant;
     top->eval();
     const auto tick = [&] {
-        top->clk = 1;
+        top->CORE_CLOCK = 1;
         top->eval();
-        top->clk = 0;
+        top->CORE_CLOCK = 0;
         top->eval();
     };
     const Row* const last_write = writes + write_count;
@@ -87,6 +87,9 @@ int64_t judge(int64_t mutant, int seed, int64_t before, int64_t clocks, const Ro
             std::copy(now, now + kept_count, held);
         }
         for (; writes != last_write && writes->clock == clock; ++writes) ports[writes->port].set(writes->value);
+#ifdef CORE_HAS_ASYNC
+        top->eval();  // what acts without a clock has acted before its edge
+#endif
         tick();
     }
     return -1;

@@ -13,7 +13,7 @@ from functools import partial
 from fluxproof.files import write_text
 from scripts.mutate import draw, equivalent, harness
 from scripts.mutate.contract import miter
-from scripts.mutate.subject import Core, Subject
+from scripts.mutate.subject import Board, Core, Subject
 
 PROOF_S = 2  # of processor time for one step of the proof of one mutant
 KILLED = "killed"
@@ -53,7 +53,7 @@ class Watch:
         self.seconds[name], self.last = round(now - self.last, 2), now
 
 
-def judge(subject: Subject | Core, seed: int, trials: Sequence[harness.Trial] = ()) -> Verdicts:
+def judge(subject: Subject | Core | Board, seed: int, trials: Sequence[harness.Trial] = ()) -> Verdicts:
     """Draws the subject's mutants with ``seed`` and judges them.
 
     trials: what drives and compares, by default those of the subject's bench.  Raises WrongHarness where the netlist

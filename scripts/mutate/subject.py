@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is mutated: each block of the registry with each of its configurations, and the wiring of the core."""
+"""What is mutated: each block of the registry with each of its configurations, the wiring of the core and the board."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fluxproof.cosim.sources import rtl_sources
 from fluxproof.cosim.verilog import TOP, sources_of, synthesize, top_ports
 from golden_model.block import Block
 from golden_model.registry import BLOCKS
-from scripts.mutate import core
+from scripts.mutate import board, core
 from scripts.mutate.harness import BENCH_SEED, Trial, block_trial
 
 FOLDER = BUILD / "mutate"
@@ -112,6 +112,40 @@ class Core:
         for k, changed in enumerate((core.FAST, core.ADRIFT)):
             recorders.append(core.every_event(core.INVERTED, changed, core.SEED + k))
         return [recorder.trial(ports) for recorder in recorders]
+
+
+@dataclass(frozen=True)
+class Board:
+    """The own cells and connections of fluxproof_board, with the front ends of one run."""
+
+    index: int
+    of: str = board.TOP
+    flat: bool = False
+    no_change: None = None
+
+    @property
+    def name(self) -> str:
+        return f"{self.of}-{self.index}"
+
+    @property
+    def top(self) -> str:
+        return board.TOP
+
+    @property
+    def folder(self) -> Path:
+        return FOLDER / self.name
+
+    def verilog(self) -> str:
+        """The converted VHDL."""
+        return synthesize(sources_of(self.top), self.top, board.RUNS[self.index]().generics())
+
+    def count(self, cells: int) -> int:
+        return board.MUTANTS
+
+    def trials(self) -> list[Trial]:
+        """Its run through the pins."""
+        ports = top_ports(self.folder / "design.v", top=self.top)
+        return [board.trial(board.RUNS[self.index](), ports)]
 
 
 def subjects(only: str = "") -> list[Subject]:

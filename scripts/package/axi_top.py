@@ -34,6 +34,7 @@ RENAMED = {
     ("core", "gate_low"): "gate_low_next",
     ("core", "sample_trigger"): "trigger_next",
     ("core", "trip"): "trip_now",
+    ("core", "brake"): "brake_next",
     ("stage", "trip"): "trip_now",
     ("stream", "enable"): "telemetry_enable",
     ("stream", "dropped"): "telemetry_dropped",
@@ -45,6 +46,9 @@ GENERICS = {
     "POSITION_BITS": ("integer range 8 to 18", 16, "width of the position code"),
     "CARRIER_HALF": ("integer range 8 to 32767", 10000, "half a PWM period in clocks"),
     "ESTIMATORS": ("integer range 0 to 1", 1, "0 leaves the estimators out"),
+    "GATE_ACTIVE": ("integer range 0 to 1", 1, "level of gate_high and gate_low at which a switch is on"),
+    "TRIP_ACTIVE": ("integer range 0 to 1", 1, "level of trip that turns the gates off"),
+    "BRAKE_ACTIVE": ("integer range 0 to 1", 1, "level of brake at which the resistor is on"),
 }
 # The telemetry's queue, of which 512 words are one block RAM; its counters, which only a bench makes smaller
 LEFT_AT_DEFAULT = {"DEPTH_BITS", "NUMBER_W", "DROPPED_W"}
@@ -83,7 +87,7 @@ PINS = (
     ("adc_c", "in", CODE, "ADC code, phase c"),
     ("adc_u_dc", "in", CODE, "ADC code, bus voltage"),
     ("position_code", "in", POSITION, "position code, one mechanical turn"),
-    ("trip", "in", None, "asynchronous, 1: gates off without a clock, remembered"),
+    ("trip", "in", None, "asynchronous, TRIP_ACTIVE: gates off without a clock, remembered"),
     ("gate_high", "out", "2 downto 0", "upper gates, bit 0 is leg a"),
     ("gate_low", "out", "2 downto 0", "lower gates, bit 0 is leg a"),
     ("brake", "out", None, "brake resistor on"),

@@ -26,6 +26,7 @@ source [file join $here result.tcl]
 # Without a drive: 100 MHz and 10 kHz PWM.
 foreach {name value} {
   clock_hz 100000000 adc_bits 16 position_bits 16 carrier_half 5000 estimators 1 base_address 0x43C00000
+  gate_active 1 trip_active 1 brake_active 1
 } {
   if {![info exists $name]} {
     set $name $value
@@ -55,7 +56,10 @@ set_property -dict [list \
   CONFIG.ADC_BITS $adc_bits \
   CONFIG.POSITION_BITS $position_bits \
   CONFIG.CARRIER_HALF $carrier_half \
-  CONFIG.ESTIMATORS $estimators] $drive
+  CONFIG.ESTIMATORS $estimators \
+  CONFIG.GATE_ACTIVE $gate_active \
+  CONFIG.TRIP_ACTIVE $trip_active \
+  CONFIG.BRAKE_ACTIVE $brake_active] $drive
 
 # Telemetry: packets of the stream into memory, one descriptor each, as docs/telemetry.md tells.
 set dma [create_bd_cell -type ip -vlnv xilinx.com:ip:axi_dma dma]

@@ -11,6 +11,7 @@ from cocotb_tests.support.board.loop_bench import BoardLoop, with_abz_and_spi
 from cocotb_tests.support.drives import PAPER
 from fluxproof.checkout import DRIVES
 from fluxproof.cosim.board_clock import STATUS
+from fluxproof.cosim.fault_run import edges_run, serial_run
 from golden_model.drive import load
 from golden_model.formats import PU, TURN
 
@@ -78,6 +79,8 @@ def of_drive(
 
 
 RUNS = {
+    "faults, serial and modulators": serial_run,
+    "faults, edges": edges_run,
     "standstill": start_from_standstill,
     "standstill, short periods": lambda: start_from_standstill(SHORT_HALF),
     # The shaft turns such that two edges of the Hall sensors come in time

@@ -71,7 +71,9 @@ array set known {
   ipx::save_core        {{} 1 1}
   ipx::archive_core     {{} 2 2}
   get_ports             {{-filter 1} 0 1}
-  get_pins              {{} 1 1}
+  get_pins              {{-quiet 0 -hierarchical 0 -filter 1} 0 1}
+  all_fanin             {{-flat 0 -startpoints_only 0} 1 1}
+  set_max_delay         {{-datapath_only 0 -from 1 -to 1} 1 1}
   get_cells             {{-hierarchical 0 -filter 1} 0 1}
   create_clock          {{-name 1 -period 1} 1 1}
   set_false_path        {{-from 1 -to 1} 0 0}
@@ -259,6 +261,28 @@ proc do_get_ports {options args} {
     }
   }
   return [expr {[llength $args] ? [lindex $args 0] : "ports"}]
+}
+# The pins of the open design are in design_pins, if FACTS sets it: names from the top of the design on.
+proc do_get_pins {options args} {
+  if {![dict exists $options -filter]} {
+    return [lindex $args 0]
+  }
+  if {![regexp {^NAME =~ (\S+)$} [dict get $options -filter] -> pattern]} {
+    error "get_pins: unknown filter [dict get $options -filter]"
+  }
+  set pattern [string map {{[} {\[} {]} {\]}} $pattern]
+  return [lsearch -all -inline -glob [expr {[info exists ::design_pins] ? $::design_pins : {}}] $pattern]
+}
+proc do_all_fanin {options pins} {
+  if {![llength $pins]} {
+    error "all_fanin: no object"
+  }
+  return ports
+}
+proc do_set_false_path {options} {
+  if {[dict exists $options -to] && [dict get $options -to] eq ""} {
+    error "set_false_path: no object for -to"
+  }
 }
 proc do_get_cells {options args} {
   return cells

@@ -21,6 +21,7 @@ from golden_model import drive
 from golden_model.drive_file import read_sections, read_tables
 from golden_model.drive_keys import DriveError, key_of
 from golden_model.front_ends import Converters, Encoder
+from golden_model.supply import Supply
 
 
 def _any_drive(kind: type, name: str, default: Any = dataclasses.MISSING, **limits: int) -> Any:
@@ -42,7 +43,6 @@ class Inverter(drive.Inverter):
     """[inverter] of any drive."""
 
     dead_time_s: float | None = _any_drive(drive.Inverter, "dead_time_s", None)
-    min_pulse_s: float | None = _any_drive(drive.Inverter, "min_pulse_s", None)
 
 
 @dataclass(frozen=True)
@@ -96,6 +96,7 @@ class Nominal:
     sampling: drive.Sampling
     encoder: Encoder
     converters: Converters
+    supply: Supply
     columns: dict = field(default_factory=dict)
     path: str = ""
     plant: dict = field(default_factory=dict)

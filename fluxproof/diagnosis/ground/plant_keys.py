@@ -49,7 +49,7 @@ OWN = {  # ranges that are neither the core's nor those of a unit
     "sensors.current_noise_a": Key("float", "A", 0.0, RANGES["A"][1]),
     "sensors.u_dc_noise_v": Key("float", "V", 0.0, RANGES["V"][1]),
     "sensors.position_noise_rad": Key("float", "rad", 0.0, RANGES["rad"][1]),
-    "sensors.position_direction": Key("int", lo=-1, hi=1, nonzero=True),
+    "sensors.position_direction": Key("int", lo=-1, hi=1, least=1.0),
     "sensors.position_counts": Key("int", lo=0, hi=1 << 24),
     "sensors.seed": Key("int", lo=0, hi=(1 << 63) - 1),
     "machine.cogging_order": Key("int", lo=0, hi=100_000),
