@@ -15,10 +15,11 @@ import pytest
 from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.host.golden_board import GoldenBoard
 from cocotb_tests.support.host.rtl_board import RtlBoard
-from fluxproof.checkout import ROOT
+from fluxproof.checkout import DRIVES, ROOT
 from fluxproof.cosim import verilog
 from fluxproof.print_registers import c_lines
 from golden_model import drive as drives
+from golden_model.board_registers import board_set
 from golden_model.io import board_map
 from golden_model.registers import registers
 from scripts.registers.rdl import version_word
@@ -34,12 +35,12 @@ def drive():
     return drives.with_carrier(drives.load(PAPER), 100)
 
 
-def compiled(folder: Path, drive, bus: Path) -> Path:
+def compiled(folder: Path, drive, bus: Path, settings=registers) -> Path:
     """bring_up.c for ``drive`` with the functions of ``bus``."""
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None:
         pytest.skip("there is no C compiler here")
-    header = "\n".join(c_lines(str(PAPER), drive, registers(drive))) + "\n"
+    header = "\n".join(c_lines(str(PAPER), drive, settings(drive))) + "\n"
     (folder / "drive_registers.h").write_text(header)
     program = folder / f"bring_up_{bus.stem}"
     includes = [f"-I{folder}", f"-I{SOFTWARE}"]
@@ -191,3 +192,17 @@ def test_a_refused_register_is_named(drive, program):
     board.write = lambda address, word: 2 if address == 0x170 else 0
     done = board.run(program)
     assert done.returncode == 1 and "refused" in done.stderr and "at 0x170" in done.stderr, done.stderr
+
+
+@pytest.mark.parametrize(("looks", "status"), [(60, 0), (0, 1)])
+def test_the_index_is_looked_for_before_the_encoder_is_believed(tmp_path, monkeypatch, looks, status):
+    """With an A/B/Z encoder a field of the host's is turned until the index is there; without it the gates go off."""
+    drive = drives.load(DRIVES / "servo_24v.toml")
+    bus = ROOT / "cocotb_tests" / "support" / "host" / "bus_memory.c"
+    program = compiled(tmp_path, drive, bus, board_set)
+    monkeypatch.setenv("FLUXPROOF_INDEX_AFTER", str(looks))
+    done = subprocess.run([program, "0"], capture_output=True, text=True)
+    assert done.returncode == status, done.stdout + done.stderr
+    assert ("index found" in done.stdout) == (status == 0)
+    if status:
+        assert "no index in 2.2 turns" in done.stderr

@@ -802,9 +802,9 @@ extern "C" {
 #define FLUXPROOF__FORCED_RATE__VALUE_reset 0x0
 
 // reg - fluxproof::board_ignore
-#define FLUXPROOF__BOARD_IGNORE__VALUE_bm 0x7
+#define FLUXPROOF__BOARD_IGNORE__VALUE_bm 0x1f
 #define FLUXPROOF__BOARD_IGNORE__VALUE_bp 0
-#define FLUXPROOF__BOARD_IGNORE__VALUE_bw 3
+#define FLUXPROOF__BOARD_IGNORE__VALUE_bw 5
 #define FLUXPROOF__BOARD_IGNORE__VALUE_reset 0x0
 
 // reg - fluxproof::encoder_flags
@@ -853,14 +853,14 @@ extern "C" {
 #define FLUXPROOF__FORCED__VALUE_bw 1
 
 // reg - fluxproof::board_flags
-#define FLUXPROOF__BOARD_FLAGS__VALUE_bm 0x7
+#define FLUXPROOF__BOARD_FLAGS__VALUE_bm 0x1f
 #define FLUXPROOF__BOARD_FLAGS__VALUE_bp 0
-#define FLUXPROOF__BOARD_FLAGS__VALUE_bw 3
+#define FLUXPROOF__BOARD_FLAGS__VALUE_bw 5
 
 // reg - fluxproof::board_first
-#define FLUXPROOF__BOARD_FIRST__VALUE_bm 0x7
+#define FLUXPROOF__BOARD_FIRST__VALUE_bm 0x1f
 #define FLUXPROOF__BOARD_FIRST__VALUE_bp 0
-#define FLUXPROOF__BOARD_FIRST__VALUE_bw 3
+#define FLUXPROOF__BOARD_FIRST__VALUE_bw 5
 
 // reg - fluxproof::snap_ready
 #define FLUXPROOF__SNAP_READY__VALUE_bm 0x1
@@ -1038,6 +1038,12 @@ extern "C" {
 #define FLUXPROOF__BRIDGE_MAX__VALUE_bp 0
 #define FLUXPROOF__BRIDGE_MAX__VALUE_bw 8
 #define FLUXPROOF__BRIDGE_MAX__VALUE_reset 0x0
+
+// reg - fluxproof::index_once
+#define FLUXPROOF__INDEX_ONCE__VALUE_bm 0x1
+#define FLUXPROOF__INDEX_ONCE__VALUE_bp 0
+#define FLUXPROOF__INDEX_ONCE__VALUE_bw 1
+#define FLUXPROOF__INDEX_ONCE__VALUE_reset 0x0
 
 // reg - fluxproof::clock_ratio
 #define FLUXPROOF__CLOCK_RATIO__VALUE_bm 0x1f
@@ -1412,7 +1418,8 @@ typedef struct {
     uint32_t two_errors;
     uint32_t position_delay;
     uint32_t bridge_max;
-    uint8_t RESERVED_558_55f[0x8];
+    uint32_t index_once;
+    uint8_t RESERVED_55c_55f[0x4];
     uint32_t clock_ratio;
     uint32_t spi_bits;
     uint32_t spi_skip;

@@ -179,6 +179,7 @@ ADDRESSES = {
     "two_errors": 0x54C,
     "position_delay": 0x550,
     "bridge_max": 0x554,
+    "index_once": 0x558,
     "clock_ratio": 0x560,
     "spi_bits": 0x564,
     "spi_skip": 0x568,

@@ -11,10 +11,11 @@
     14       the host does not write any more, see host_watch
 
 Faults are latched while ``enable`` is 1 (``trip`` always), so that registers can be written before; while a fault is
-present ``enable`` has no effect.  ``clear_trip`` clears the faults whose cause is gone.
+present ``enable`` has no effect.  ``clear_trip`` clears the faults whose cause is gone, where no new cause of a
+trip came in the ``HELD`` clocks before; else it clears nothing: who wrote it on the bus cannot have seen that trip.
 ``first_fault`` contains all faults of the first clock that tripped, until nothing trips any more.
 ``fault_ignore``: fault x is reported in the flags and does not trip; ``trip`` always trips.
-``gate_clear`` is ``clear_trip`` one clock later, when the flags are cleared, for the trip latch of the gates.
+``gate_clear`` is such a ``clear_trip`` one clock later, when the flags are cleared, for the trip latch of the gates.
 Formats: bits.
 """
 
@@ -34,12 +35,15 @@ FLAGS = IGNORE
 LATE, TRIP, EARLY, MOTION, OPEN, OFFSET, HOST = 6, 7, 8, 9, 12, 13, 14
 ALWAYS = 1 << TRIP  # latched without enable, and cannot be ignored
 TRIPPING = FLAGS.hi - (1 << EARLY)
+HELD = 16  # clocks: longer than a write takes from the pins of the bus to clear_trip, and a trip pin to the latch
 
 
 class State(NamedTuple):
     flags: int = 0
     first: int = 0
     stop: int = 0
+    causes: int = 0  # that trip, of the last clock
+    held: int = 0  # clocks for which clear_trip clears nothing
 
 
 @kernel
@@ -51,16 +55,21 @@ def step(
     now = sample_faults + (sample_late << LATE) + (trip << TRIP) + (sample_early << EARLY) + (motion_faults << MOTION)
     now += (open_load << OPEN) + (current_offset << OFFSET) + (host_lost << HOST)
     new = now if enable else now & ALWAYS
-    kept = s.flags & now if clear_trip else s.flags
+    trips = TRIPPING & (ALWAYS | ~fault_ignore)
+    causes = new & trips
+    caused = causes & ~s.causes != 0
+    clear = 1 if clear_trip and not caused and s.held == 0 else 0
+    kept = s.flags & now if clear else s.flags
     flags = new | kept
-    tripping = flags & TRIPPING & (ALWAYS | ~fault_ignore)
+    tripping = flags & trips
     stop = 1 if tripping != 0 else 0
     first = s.first if s.stop else tripping
-    return State(flags, first, stop), (flags, first, stop, clear_trip)
+    following = State(flags, first, stop, causes, HELD if caused else max(s.held - 1, 0))
+    return following, (flags, first, stop, clear)
 
 
 def stimuli(rng, config):
-    """Each fault alone and two in sequence, cleared while present and when gone, ignored, without enable."""
+    """Each fault alone and two in sequence, cleared while present, too early and when gone, ignored, without enable."""
     calm = dict.fromkeys((p.name for p in BLOCK.inputs + BLOCK.registers), 0) | {"enable": 1}
     causes = [{"sample_faults": 1 << k} for k in range(6)]
     causes += [{"sample_late": 1}, {"trip": 1}, {"sample_early": 1}]
@@ -70,16 +79,22 @@ def stimuli(rng, config):
     for k, cause in enumerate(causes):
         other = causes[(k + 4) % len(causes)]
         clear, ignore = {"clear_trip": 1}, {"fault_ignore": 1 << k}
-        rows += [calm, calm | cause, calm, calm | other, calm | other | clear, calm | clear, calm]
-        rows += [calm | cause | other, calm | cause | clear, calm | clear, calm]
-        rows += [calm | cause | {"enable": 0}, calm | cause | {"enable": 0}, calm | cause, calm | clear, calm]
+        later = [calm] * HELD
+        for wait in (0, 1, HELD - 1, HELD, HELD + 1):
+            rows += [calm | cause, *[calm] * wait, calm | clear, calm, *later, calm | clear, calm]
+            rows += [*[calm | cause] * (wait + 1), calm | other, calm | clear, *later, calm | clear, calm]
+        rows += [calm, calm | cause, calm, calm | other, calm | other | clear, calm | clear, *later, calm | clear, calm]
+        rows += [calm | cause | other, calm | cause | clear, *later, calm | cause | clear, *later, calm | clear, calm]
+        rows += [calm | cause | {"enable": 0}, calm | cause | {"enable": 0}, calm | cause, *later, calm | clear, calm]
         rows += [
             calm | cause,
+            *[calm | cause | {"enable": 0}] * HELD,
             calm | cause | clear | {"enable": 0},
             calm | cause | {"enable": 0},
+            *later,
             calm | clear,
         ]
-        rows += [calm | cause | ignore, calm | other | ignore, calm | ignore | clear, calm | clear, calm]
+        rows += [calm | cause | ignore, calm | other | ignore, *later, calm | ignore | clear, calm | clear, calm]
     return rows
 
 
@@ -105,12 +120,12 @@ BLOCK = Block(
         Port("fault_flags", FLAGS, doc="faults since the last clear_trip, see fault_latch"),
         Port("first_fault", FLAGS, doc="faults that tripped first"),
         Port("fault_stop", BIT, doc="1: gates off"),
-        Port("gate_clear", BIT, doc="clear_trip one clock later, when the flags are cleared"),
+        Port("gate_clear", BIT, doc="clear_trip, where it acts, one clock later, when the flags are cleared"),
     ),
     state=State(),
     latency=1,
     clocked=True,
-    constants={"LATE": LATE, "TRIP": TRIP, "EARLY": EARLY},
+    constants={"LATE": LATE, "TRIP": TRIP, "EARLY": EARLY, "HELD": HELD},
     reference=None,
     bound=None,
     stimuli=stimuli,

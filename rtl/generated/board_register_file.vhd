@@ -71,7 +71,7 @@ entity board_register_file is
     position_source   : out std_logic;  -- 418 0: encoder, 1: forced_angle
     forced_angle      : out unsigned(17 downto 0);  -- 41c angle of the shaft that replaces the encoder's
     forced_rate       : out signed(25 downto 0);  -- 420 what it turns by, turns a sample
-    board_ignore      : out unsigned(2 downto 0);  -- 424 bit x: fault x of the board is reported and does not trip
+    board_ignore      : out unsigned(4 downto 0);  -- 424 bit x: fault x of the board is reported and does not trip
     filter_clocks     : out unsigned(9 downto 0);  -- 500 longest pulse without effect, clocks
     index_phase       : out unsigned(1 downto 0);  -- 504 phase of A and B in which Z marks the index
     counts            : out unsigned(18 downto 0);  -- 508 counts a turn, four for each line
@@ -94,6 +94,7 @@ entity board_register_file is
     two_errors        : out std_logic;  -- 54c 1: the frame has error 2
     position_delay    : out unsigned(17 downto 0);  -- 550 time from the encoder's latch to the currents', samples
     bridge_max        : out unsigned(7 downto 0);  -- 554 samples that may be bridged one after the other
+    index_once        : out std_logic;  -- 558 1: the first index is believed, 0: the second at the same place
     clock_ratio       : out unsigned(4 downto 0);  -- 560 clocks of a period of sclk, 4 to 16
     spi_bits          : out unsigned(5 downto 0);  -- 564 bits of a word, 12 to 32
     spi_skip          : out unsigned(4 downto 0);  -- 568 bits of a word before the code
@@ -144,8 +145,8 @@ entity board_register_file is
     converter_errors  : in  unsigned(11 downto 0);  -- 458 triggers without codes, saturates
     converter_refused : in  std_logic;  -- 45c 1: the registers of the SPI converters contradict each other
     forced            : in  std_logic;  -- 460 1: the code is the host's
-    board_flags       : in  unsigned(2 downto 0);  -- 464 faults of the board since the last clear_trip, see board_faults
-    board_first       : in  unsigned(2 downto 0);  -- 468 faults of the board that tripped first
+    board_flags       : in  unsigned(4 downto 0);  -- 464 faults of the board since the last clear_trip, see board_faults
+    board_first       : in  unsigned(4 downto 0);  -- 468 faults of the board that tripped first
     snap_ready        : in  std_logic;  -- 470 1: the snapshot is there
     snap_code         : in  unsigned(17 downto 0);  -- 474 snapshot: position code of the encoder, right-aligned
     snap_position     : in  unsigned(17 downto 0);  -- 478 snapshot: position code of the sample, right-aligned
@@ -659,7 +660,7 @@ begin
         written(264) <= '1';
       end if;
       if (row(33) and column(1)) = '1' then
-        board_ignore <= unsigned(held(2 downto 0));
+        board_ignore <= unsigned(held(4 downto 0));
         written(265) <= '1';
       end if;
       if (row(40) and column(0) and not sample_busy) = '1' then
@@ -749,6 +750,10 @@ begin
       if (row(42) and column(5) and not sample_busy) = '1' then
         bridge_max   <= unsigned(held(7 downto 0));
         written(341) <= '1';
+      end if;
+      if (row(42) and column(6) and not sample_busy) = '1' then
+        index_once   <= held(0);
+        written(342) <= '1';
       end if;
       if (row(43) and column(0) and not sample_busy) = '1' then
         clock_ratio  <= unsigned(held(4 downto 0));
@@ -994,6 +999,7 @@ begin
         two_errors                <= '0';
         position_delay            <= (others => '0');
         bridge_max                <= (others => '0');
+        index_once                <= '0';
         clock_ratio               <= (others => '0');
         spi_bits                  <= (others => '0');
         spi_skip                  <= (others => '0');

@@ -593,6 +593,7 @@ package fluxproof_pkg is
   constant FAULT_LATCH_LATE : natural := 6;
   constant FAULT_LATCH_TRIP : natural := 7;
   constant FAULT_LATCH_EARLY : natural := 8;
+  constant FAULT_LATCH_HELD : natural := 16;
 
   -- host_watch: none: protection of the drive
   constant HOST_WATCH_LATENCY : positive := 1;

@@ -8,10 +8,11 @@
 --   12       a phase or the motor is not connected, see load_check
 --   13       the zero of a current sensor is wrong, see offset_check
 --   14       the host does not write any more, see host_watch
--- Faults are latched while enable is 1 (trip always); clear_trip clears the faults whose cause is gone.
+-- Faults are latched while enable is 1 (trip always); clear_trip clears the faults whose cause is gone, where no new
+-- cause of a trip came in the HELD clocks before; else nothing: who wrote it on the bus cannot have seen that trip.
 -- first_fault contains all faults of the first clock that tripped, until nothing trips any more.
 -- fault_ignore: fault x is reported in the flags and does not trip; trip always trips.
--- gate_clear is clear_trip one clock later, when the flags are cleared, for the trip latch of the gates.
+-- gate_clear is such a clear_trip one clock later, when the flags are cleared, for the trip latch of the gates.
 -- Formats: bits.  Latency: 1 (every clock is a sample).  Rounding: none.
 
 library ieee;
@@ -47,7 +48,13 @@ architecture rtl of fault_latch is
   signal flags : unsigned(14 downto 0);
   signal first : unsigned(14 downto 0);
   signal stop  : std_logic;
+  signal held  : unsigned(4 downto 0);  -- clocks for which clear_trip clears nothing
+  signal trips : unsigned(14 downto 0);  -- causes that trip, of the last clock
 
+  signal trips_0    : unsigned(14 downto 0);
+  signal may_0      : unsigned(14 downto 0);  -- 1: the fault trips
+  signal caused_0   : std_logic;
+  signal clear_0    : std_logic;
   signal now_0      : unsigned(14 downto 0);
   signal new_0      : unsigned(14 downto 0);
   signal flags_0    : unsigned(14 downto 0);
@@ -57,18 +64,27 @@ begin
 
   bits : for k in 0 to 14 generate
     new_0(k)      <= now_0(k) when k = FAULT_LATCH_TRIP else now_0(k) and enable;
-    flags_0(k)    <= new_0(k) or (flags(k) and (now_0(k) or not clear_trip));
-    tripping_0(k) <= flags_0(k) when k = FAULT_LATCH_TRIP else
-                     '0' when k = FAULT_LATCH_EARLY else
-                     flags_0(k) and not fault_ignore(k);
+    may_0(k)      <= '1' when k = FAULT_LATCH_TRIP else '0' when k = FAULT_LATCH_EARLY else not fault_ignore(k);
+    trips_0(k)    <= new_0(k) and may_0(k);
+    flags_0(k)    <= new_0(k) or (flags(k) and (now_0(k) or not clear_0));
+    tripping_0(k) <= flags_0(k) and may_0(k);
   end generate;
+
+  caused_0 <= or (trips_0 and not trips);
+  clear_0  <= clear_trip and not caused_0 and nor held;
 
   process (clk)
   begin
     if rising_edge(clk) then
       flags      <= flags_0;
       stop       <= or tripping_0;
-      gate_clear <= clear_trip;
+      gate_clear <= clear_0;
+      trips      <= trips_0;
+      if caused_0 = '1' then
+        held <= to_unsigned(FAULT_LATCH_HELD, 5);
+      elsif held /= 0 then
+        held <= held - 1;
+      end if;
       if stop = '0' then
         first <= tripping_0;
       end if;
@@ -77,6 +93,8 @@ begin
         flags      <= (others => '0');
         first      <= (others => '0');
         stop       <= '0';
+        trips      <= (others => '0');
+        held       <= (others => '0');
         gate_clear <= '0';
       end if;
     end if;

@@ -99,6 +99,7 @@ BOARD = Top(
         **axi_top.RENAMED,
         ("core", "settings"): "core_settings",
         ("core", "trip"): "core_trip",
+        ("core", "clear_trip"): "core_clear",
         ("position", "sample_trigger"): "trigger_next",
         ("position", "codes_valid"): "codes_done",
         ("position", "omega_set"): "settings.omega_given",

@@ -55,6 +55,13 @@ module formal_top (
     {was_flags, was_first} <= {fault_flags, first_fault};
   end
 
+  // Clocks since trip has become 1: 0 in the clock after, 31 and more are the same
+  reg [4:0] age = 31;
+  always @(posedge clk)
+    if (rst) age <= 31;
+    else if (trip && (rest || !was_trip)) age <= 0;
+    else if (age != 31) age <= age + 1;
+
 `ifdef STOP
   // A cause that is not ignored stops in the next clock, with its flag; without clear_trip nothing is forgotten.
   always @(posedge clk) if (begun && !rest) begin
@@ -68,6 +75,14 @@ module formal_top (
     if (fault_flags == 15'h0100) assert (!fault_stop);
     cover (fault_stop && !was_trip);
     cover (was_stop && !fault_stop);
+  end
+`endif
+
+`ifdef CLEAR
+  // A trip beats a clear: for 16 clocks after trip has become 1 nothing that is written to clear_trip lets the gates on again.
+  always @(posedge clk) if (begun && !rest) begin
+    if (age <= 16) assert (fault_stop && !gate_clear && fault_flags[7]);
+    cover (age == 17 && was_clear && !fault_stop);
   end
 `endif
 
