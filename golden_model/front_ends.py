@@ -46,7 +46,9 @@ class Encoder:
     start_s: float = positive("s", "biss, endat: longest time to the start bit", 5e-6)
     bridge_samples: int = whole(0, 255, "ssi, biss, endat: samples without a good frame that are bridged", 3)
     filter_s: float | None = not_negative("s", "abz, hall: shorter pulses on a pin have no effect", None)
-    index_passes: int = whole(1, 2, "abz: passes of the index until it is believed; 1 where the shaft cannot turn on", 2)
+    index_passes: int = whole(
+        1, 2, "abz: passes of the index until it is believed; 1 where the shaft cannot turn on", 2
+    )
     index_phase: int | None = whole(0, 3, "abz: quarter of a line in which Z counts; A, B = 00, 10, 11, 01", None)
 
 

@@ -71,7 +71,7 @@ def test_faults_of_the_board_in_ghdl(run, after, tmp_path):
     """What turns the gates off by name, through the pins: every clock as the golden board (test_front_ends judges)."""
     periods = RUNS[run]().settled + after
     facts = in_ghdl(periods, run, tmp_path)
-    stopped = run != "clear at a trip" and run != "before the index"
+    stopped = run not in ("clear at a trip", "before the index")
     assert facts["clocks"] > 0 and (facts["board_first"] == 1 << NAMES.index("hall_code")) == stopped
 
 

@@ -49,7 +49,7 @@ def test_no_torque_before_the_index():
 
 
 def test_a_trip_beats_a_clear():
-    """A pulse at the pin trip within the clocks that a write of clear_trip takes: the drive stays off; cleared later."""
+    """A pulse at the pin trip within the clocks that a write of clear_trip takes: the drive stays off until later."""
     facts = run("trip_against_clear")
     assert facts["running_before"] and facts["after"] == [0] * len(facts["after"]) and len(facts["after"]) == 12
     assert facts["first_faults"] == [1 << TRIP] * 12 and facts["running_at_last"]

@@ -268,14 +268,14 @@ extern "C" {
 #define FLUXPROOF__TELEMETRY_DROPPED__VALUE_bw 16
 
 // reg - fluxproof::fault_flags
-#define FLUXPROOF__FAULT_FLAGS__VALUE_bm 0x7fff
+#define FLUXPROOF__FAULT_FLAGS__VALUE_bm 0xffff
 #define FLUXPROOF__FAULT_FLAGS__VALUE_bp 0
-#define FLUXPROOF__FAULT_FLAGS__VALUE_bw 15
+#define FLUXPROOF__FAULT_FLAGS__VALUE_bw 16
 
 // reg - fluxproof::first_fault
-#define FLUXPROOF__FIRST_FAULT__VALUE_bm 0x7fff
+#define FLUXPROOF__FIRST_FAULT__VALUE_bm 0xffff
 #define FLUXPROOF__FIRST_FAULT__VALUE_bp 0
-#define FLUXPROOF__FIRST_FAULT__VALUE_bw 15
+#define FLUXPROOF__FIRST_FAULT__VALUE_bw 16
 
 // reg - fluxproof::early_samples
 #define FLUXPROOF__EARLY_SAMPLES__VALUE_bm 0xff
@@ -499,9 +499,9 @@ extern "C" {
 #define FLUXPROOF__WATCHDOG__VALUE_reset 0x0
 
 // reg - fluxproof::fault_ignore
-#define FLUXPROOF__FAULT_IGNORE__VALUE_bm 0x7fff
+#define FLUXPROOF__FAULT_IGNORE__VALUE_bm 0xffff
 #define FLUXPROOF__FAULT_IGNORE__VALUE_bp 0
-#define FLUXPROOF__FAULT_IGNORE__VALUE_bw 15
+#define FLUXPROOF__FAULT_IGNORE__VALUE_bw 16
 #define FLUXPROOF__FAULT_IGNORE__VALUE_reset 0x0
 
 // reg - fluxproof::flux_mode
@@ -749,6 +749,36 @@ extern "C" {
 #define FLUXPROOF__BRAKE_OFF__VALUE_bp 0
 #define FLUXPROOF__BRAKE_OFF__VALUE_bw 9
 #define FLUXPROOF__BRAKE_OFF__VALUE_reset 0x0
+
+// reg - fluxproof::emf_min
+#define FLUXPROOF__EMF_MIN__VALUE_bm 0x1ffff
+#define FLUXPROOF__EMF_MIN__VALUE_bp 0
+#define FLUXPROOF__EMF_MIN__VALUE_bw 17
+#define FLUXPROOF__EMF_MIN__VALUE_reset 0x0
+
+// reg - fluxproof::emf_i
+#define FLUXPROOF__EMF_I__VALUE_bm 0x7fffff
+#define FLUXPROOF__EMF_I__VALUE_bp 0
+#define FLUXPROOF__EMF_I__VALUE_bw 23
+#define FLUXPROOF__EMF_I__VALUE_reset 0x0
+
+// reg - fluxproof::emf_w
+#define FLUXPROOF__EMF_W__VALUE_bm 0xffffff
+#define FLUXPROOF__EMF_W__VALUE_bp 0
+#define FLUXPROOF__EMF_W__VALUE_bw 24
+#define FLUXPROOF__EMF_W__VALUE_reset 0x0
+
+// reg - fluxproof::emf_samples
+#define FLUXPROOF__EMF_SAMPLES__VALUE_bm 0xfff
+#define FLUXPROOF__EMF_SAMPLES__VALUE_bp 0
+#define FLUXPROOF__EMF_SAMPLES__VALUE_bw 12
+#define FLUXPROOF__EMF_SAMPLES__VALUE_reset 0x0
+
+// reg - fluxproof::emf_l
+#define FLUXPROOF__EMF_L__VALUE_bm 0xffffff
+#define FLUXPROOF__EMF_L__VALUE_bp 0
+#define FLUXPROOF__EMF_L__VALUE_bw 24
+#define FLUXPROOF__EMF_L__VALUE_reset 0x0
 
 // reg - fluxproof::double_update
 #define FLUXPROOF__DOUBLE_UPDATE__VALUE_bm 0x1
@@ -1360,7 +1390,12 @@ typedef struct {
     uint32_t heartbeat;
     uint32_t brake_on;
     uint32_t brake_off;
-    uint8_t RESERVED_228_23f[0x18];
+    uint32_t emf_min;
+    uint32_t emf_i;
+    uint32_t emf_w;
+    uint32_t emf_samples;
+    uint32_t emf_l;
+    uint8_t RESERVED_23c_23f[0x4];
     uint32_t double_update;
     uint8_t RESERVED_244_3ff[0x1bc];
     uint32_t encoder;

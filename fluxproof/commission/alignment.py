@@ -128,8 +128,8 @@ def _find_index(s: Session, speed: float) -> None:
     seen = s.look(looks, pause, until=lambda _: bool(s.bus.read("encoder_flags") & 1))
     if not s.bus.read("encoder_flags") & 1 and float(np.ptp(seen.code)) > 0.9:
         raise Refusal(
-            "no index within a turn of the shaft, or not again at the same place, expected one a turn; check the line Z "
-            "and [encoder] index_phase"
+            "no index within a turn of the shaft, or not again at the same place, expected one a turn; check the line "
+            "Z and [encoder] index_phase"
         )
 
 

@@ -23,7 +23,7 @@ from golden_model.units import TURN_RAD, from_si, to_si
 STOP_OF_LIMIT = 1.05  # of the current limit: a snapshot above ends the commissioning
 TRIPPED = 1 << 1  # of the register flags
 # Nothing that rests on the machine's data acts during commissioning, and no limit of a speed that is forced.
-QUIET = {"compensate": 0, "flux_mode": 0, "l_d": 0, "l_q": 0, "lambda_mg": 0}
+QUIET = {"compensate": 0, "flux_mode": 0, "l_d": 0, "l_q": 0, "lambda_mg": 0, "emf_samples": 0}
 OPEN_WIDE = ("omega_trip", "omega_away", "offset_max")  # limits of the motion and of the sensors' zero, not yet known
 
 

@@ -109,6 +109,7 @@ class SimulatedBus:
             edges=edges_of(drive),
             codes=np.zeros(len(CODES), np.int64),
             observed=np.zeros(len(FIELDS), np.int64),
+            held=np.zeros(2),
             peak=np.zeros(1),
         )
         self._state, self._random = fluxproof.State(), np.random.default_rng(board.seed)
@@ -125,6 +126,10 @@ class SimulatedBus:
     @property
     def true_theta_m(self) -> float:
         return float(self._memory.plant[L.THETA_M])
+
+    def lose_encoder(self) -> None:
+        """From now on the encoder stands where it is, whatever the shaft does."""
+        self._memory.held[:] = 1.0, self.true_theta_m
 
     def read(self, name: str) -> int:
         now = self._memory

@@ -32,6 +32,7 @@ FAULTS += [
     for field, name in (
         ("motion_faults", "overspeed"),
         ("open_load", "open_load"),
+        ("encoder_lost", "encoder_lost"),
         ("current_offset", "current_offset"),
     )
     if field in FIELDS
@@ -66,6 +67,7 @@ class Memory(NamedTuple):
     edges: np.ndarray  # as simulated_edges
     codes: np.ndarray  # (6,) CODES of the last sample
     observed: np.ndarray  # (len(FIELDS),) its values
+    held: np.ndarray  # (2,) 1: the encoder does not move any more; mechanical rad at which it stands
     peak: np.ndarray  # (1,) A, the largest phase current so far
 
 
@@ -105,10 +107,12 @@ def forced_code(forced, code, found, position_bits):
 def encoder(around, memory, usual, k):
     """(code, 1 where the count finds its index, omega_given) of the encoder at sample ``k``."""
     a, plant, edges, bits = around, memory.plant, memory.edges, around.config.position_bits
-    code, omega = position_code(a.sensors, plant[L.THETA_M], k), usual.omega_given
-    turns = (a.sensors.direction * plant[L.THETA_M] + a.sensors.position_offset) / TURN_RAD
+    lost = memory.held[0] == 1.0
+    theta_m, omega_m = (memory.held[1], 0.0) if lost else (plant[L.THETA_M], plant[L.OMEGA_M])
+    code, omega = position_code(a.sensors, theta_m, k), usual.omega_given
+    turns = (a.sensors.direction * theta_m + a.sensors.position_offset) / TURN_RAD
     if edges[COUNTS] > 0.0:
-        turns_per_s = a.sensors.direction * plant[L.OMEGA_M] / TURN_RAD
+        turns_per_s = a.sensors.direction * omega_m / TURN_RAD
         omega = (-1 if usual.reverse else 1) * edge_speed(edges, turns, turns_per_s, k * a.period_s)
     if edges[HALL] > 0.0:
         code = hall_code(a.params.machine.pole_pairs, turns, bits)
@@ -180,10 +184,12 @@ def advance(state, inputs, usual, around, memory, first, periods):
         duties[0] = state.compare_a / config.carrier_half
         duties[1] = state.compare_b / config.carrier_half
         duties[2] = state.compare_c / config.carrier_half
+        emf_samples = usual.emf_samples if m.forced[SOURCE] == 0 else 0
         of_speed = fluxproof.Given(
             speed_given=1 if usual.speed_given == 1 and m.forced[SOURCE] == 0 else 0,
             omega_given=omega,
             position_restart=1 if jumped else usual.position_restart,
+            emf_samples=emf_samples,
         )
         state, seen = fluxproof.step_given(state, sample, usual, config, of_speed)
         for n, value in enumerate(seen):

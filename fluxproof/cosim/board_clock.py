@@ -155,6 +155,7 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
         sample_valid=w.sample_valid, enable=i.enable, trip=1 if w.board_stop or state.trip_2 else 0,
         clear_trip=w.core_clear, host_write=i.host_write, sample_faults=i.sample_faults, sample_trip=i.sample_trip,
         current_offset=i.current_offset, motion_faults=i.motion_faults, open_load=i.open_load,
+        encoder_lost=i.encoder_lost,
         brake_asked=i.brake_asked, compare_a=i.compare_a, compare_b=i.compare_b, compare_c=i.compare_c,
     )  # fmt: skip
     core, entered, seen_core = clocked.step(state.of_core, now, regs, carrier_half)
@@ -363,6 +364,7 @@ class BoardClock:
             omega_given=w.omega_now,
             speed_given=w.speed_now,
             position_restart=1 if values["position_restart"] or w.position_restart else 0,
+            emf_samples=0 if w.forced else values["emf_samples"],
         )
         self.of_samples, observed = fluxproof.step(self.of_samples, sample, registers, self.blocks.core)
         self.observed = observed

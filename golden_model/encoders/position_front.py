@@ -69,7 +69,9 @@ def step(state, inputs, regs, encoder, position_bits):
     start = 1 if s.start_valid and not s.refused and not s.started else 0
 
     if encoder == HALL or encoder == HALL_ABZ:
-        hall, (hall_code, hall_omega, hall_done, hall_valid, start_count, start_valid, hall_illegals, _, skipped) = hall_step(
+        hall, (
+            hall_code, hall_omega, hall_done, hall_valid, start_count, start_valid, hall_illegals, _, skipped
+        ) = hall_step(
             s.of_hall,
             x,
             hall_front.Registers(
@@ -90,7 +92,8 @@ def step(state, inputs, regs, encoder, position_bits):
             ),
             incremental_encoder.Registers(
                 filter_clocks=r.filter_clocks, index_phase=r.index_phase, counts=r.counts, code_step=r.code_step,
-                code_rest=r.code_rest, correct_max=r.correct_max, index_once=r.index_once, reverse=x.reverse, k_edge=r.k_edge,
+                code_rest=r.code_rest, correct_max=r.correct_max, index_once=r.index_once, reverse=x.reverse,
+                k_edge=r.k_edge,
             ),
             position_bits,
         )  # fmt: skip
@@ -208,7 +211,16 @@ INPUTS = (
     _PORTS["reverse"],
 )
 Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
-_INCREMENTAL = ("filter_clocks", "index_phase", "counts", "code_step", "code_rest", "correct_max", "index_once", "k_edge")
+_INCREMENTAL = (
+    "filter_clocks",
+    "index_phase",
+    "counts",
+    "code_step",
+    "code_rest",
+    "correct_max",
+    "index_once",
+    "k_edge",
+)
 _HALL = ("hall_reverse", "hall_offset", "start_first", "sector_counts")
 REGISTERS = (*(_PORTS[n] for n in (*_INCREMENTAL, *_HALL)), *serial_encoder.REGISTERS)
 Registers = namedtuple("Registers", [p.name for p in REGISTERS])

@@ -9,6 +9,7 @@
     12       a phase or the motor is not connected, see load_check
     13       the zero of a current sensor is wrong, see offset_check
     14       the host does not write any more, see host_watch
+    15       encoder and EMF contradict each other, see emf_check
 
 Faults are latched while ``enable`` is 1 (``trip`` always), so that registers can be written before; while a fault is
 present ``enable`` has no effect.  ``clear_trip`` clears the faults whose cause is gone, where no new cause of a
@@ -19,6 +20,7 @@ trip came in the ``HELD`` clocks before; else it clears nothing: who wrote it on
 Formats: bits.
 """
 
+from collections import namedtuple
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
@@ -30,9 +32,10 @@ from golden_model.kernel import kernel
 NAMES = (
     "overcurrent", "current_sum", "at_rail", "u_dc_low", "u_dc_high", "position", "watchdog", "trip", "early",
     "overspeed", "runaway", "stall", "open_load", "current_offset", "host_lost",
+    "encoder_lost",
 )  # fmt: skip
 FLAGS = IGNORE
-LATE, TRIP, EARLY, MOTION, OPEN, OFFSET, HOST = 6, 7, 8, 9, 12, 13, 14
+LATE, TRIP, EARLY, MOTION, OPEN, OFFSET, HOST, ENCODER = 6, 7, 8, 9, 12, 13, 14, 15
 ALWAYS = 1 << TRIP  # latched without enable, and cannot be ignored
 TRIPPING = FLAGS.hi - (1 << EARLY)
 HELD = 16  # clocks: longer than a write takes from the pins of the bus to clear_trip, and a trip pin to the latch
@@ -47,18 +50,16 @@ class State(NamedTuple):
 
 
 @kernel
-def step(
-    state, trip, sample_faults, sample_late, sample_early, motion_faults, open_load, current_offset, host_lost, enable,
-    clear_trip, fault_ignore,
-):  # fmt: skip
-    s = state
-    now = sample_faults + (sample_late << LATE) + (trip << TRIP) + (sample_early << EARLY) + (motion_faults << MOTION)
-    now += (open_load << OPEN) + (current_offset << OFFSET) + (host_lost << HOST)
-    new = now if enable else now & ALWAYS
-    trips = TRIPPING & (ALWAYS | ~fault_ignore)
+def step(state, inputs, regs):
+    s, x = state, inputs
+    now = x.sample_faults + (x.sample_late << LATE) + (x.trip << TRIP) + (x.sample_early << EARLY)
+    now += (x.motion_faults << MOTION) + (x.open_load << OPEN) + (x.current_offset << OFFSET)
+    now += (x.host_lost << HOST) + (x.encoder_lost << ENCODER)
+    new = now if x.enable else now & ALWAYS
+    trips = TRIPPING & (ALWAYS | ~regs.fault_ignore)
     causes = new & trips
     caused = causes & ~s.causes != 0
-    clear = 1 if clear_trip and not caused and s.held == 0 else 0
+    clear = 1 if x.clear_trip and not caused and s.held == 0 else 0
     kept = s.flags & now if clear else s.flags
     flags = new | kept
     tripping = flags & trips
@@ -74,7 +75,7 @@ def stimuli(rng, config):
     causes = [{"sample_faults": 1 << k} for k in range(6)]
     causes += [{"sample_late": 1}, {"trip": 1}, {"sample_early": 1}]
     causes += [{"motion_faults": 1 << k} for k in range(3)]
-    causes += [{"open_load": 1}, {"current_offset": 1}, {"host_lost": 1}]
+    causes += [{"open_load": 1}, {"current_offset": 1}, {"host_lost": 1}, {"encoder_lost": 1}]
     rows = []
     for k, cause in enumerate(causes):
         other = causes[(k + 4) % len(causes)]
@@ -98,24 +99,31 @@ def stimuli(rng, config):
     return rows
 
 
+INPUTS = (
+    Port("trip", BIT, doc="1: gates off, latched"),
+    Port("sample_faults", CHECKS, doc="what is wrong with the last sample"),
+    Port("sample_late", BIT, doc="1: the last sample is older than watchdog clocks"),
+    Port("sample_early", BIT, doc="1: a sample came too early and was rejected"),
+    Port("motion_faults", MOTION_FAULTS, doc="overspeed, runaway, stall"),
+    Port("open_load", BIT, doc="1: a phase or the motor is not connected"),
+    Port("current_offset", BIT, doc="1: the zero of a current sensor is wrong"),
+    Port("host_lost", BIT, doc="1: the last write is older than heartbeat periods"),
+    Port("encoder_lost", BIT, doc="1: encoder and EMF contradict each other"),
+    Port("enable", BIT, doc="1: gates may switch"),
+    Port("clear_trip", BIT, doc="1: clear the flags whose cause is gone"),
+)
+Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
+REGISTERS = (Port("fault_ignore", IGNORE, doc="bit x: fault x of fault_flags is reported and does not trip"),)
+Registers = namedtuple("Registers", [p.name for p in REGISTERS])
+
 BLOCK = Block(
     name="fault_latch",
     folder="io",
     paper="none: protection and diagnosis of the drive",
     step=step,
-    inputs=(
-        Port("trip", BIT, doc="1: gates off, latched"),
-        Port("sample_faults", CHECKS, doc="what is wrong with the last sample"),
-        Port("sample_late", BIT, doc="1: the last sample is older than watchdog clocks"),
-        Port("sample_early", BIT, doc="1: a sample came too early and was rejected"),
-        Port("motion_faults", MOTION_FAULTS, doc="overspeed, runaway, stall"),
-        Port("open_load", BIT, doc="1: a phase or the motor is not connected"),
-        Port("current_offset", BIT, doc="1: the zero of a current sensor is wrong"),
-        Port("host_lost", BIT, doc="1: the last write is older than heartbeat periods"),
-        Port("enable", BIT, doc="1: gates may switch"),
-        Port("clear_trip", BIT, doc="1: clear the flags whose cause is gone"),
-    ),
-    registers=(Port("fault_ignore", IGNORE, doc="bit x: fault x of fault_flags is reported and does not trip"),),
+    takes=(Inputs, Registers),
+    inputs=INPUTS,
+    registers=REGISTERS,
     outputs=(
         Port("fault_flags", FLAGS, doc="faults since the last clear_trip, see fault_latch"),
         Port("first_fault", FLAGS, doc="faults that tripped first"),

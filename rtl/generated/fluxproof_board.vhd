@@ -177,8 +177,8 @@ architecture rtl of fluxproof_board is
   signal running           : std_logic;
   signal tripped           : std_logic;
   signal sample_busy       : std_logic;
-  signal fault_flags       : unsigned(14 downto 0);
-  signal first_fault       : unsigned(14 downto 0);
+  signal fault_flags       : unsigned(15 downto 0);
+  signal first_fault       : unsigned(15 downto 0);
   signal early_samples     : unsigned(7 downto 0);
   signal setting_refused   : std_logic;
   signal min_pulse_used    : unsigned(11 downto 0);
@@ -257,13 +257,16 @@ begin
   sample.clear_faults  <= clear_faults_in;
 
   -- What the front ends know better than a register
-  process (settings, omega_now, speed_now, position_restart)
+  process (settings, omega_now, speed_now, position_restart, forced)
     variable given : settings_t;
   begin
     given                  := settings;
     given.omega_given      := omega_now;
     given.speed_given      := speed_now;
     given.position_restart := settings.position_restart or position_restart;
+    if forced = '1' then
+      given.emf_samples := (others => '0');
+    end if;
     core_settings          <= given;
   end process;
 

@@ -8,6 +8,7 @@
 --   12       a phase or the motor is not connected, see load_check
 --   13       the zero of a current sensor is wrong, see offset_check
 --   14       the host does not write any more, see host_watch
+--   15       encoder and EMF contradict each other, see emf_check
 -- Faults are latched while enable is 1 (trip always); clear_trip clears the faults whose cause is gone, where no new
 -- cause of a trip came in the HELD clocks before; else nothing: who wrote it on the bus cannot have seen that trip.
 -- first_fault contains all faults of the first clock that tripped, until nothing trips any more.
@@ -33,11 +34,12 @@ entity fault_latch is
     open_load      : in  std_logic;
     current_offset : in  std_logic;
     host_lost      : in  std_logic;
+    encoder_lost   : in  std_logic;
     enable         : in  std_logic;
     clear_trip     : in  std_logic;
-    fault_ignore   : in  unsigned(14 downto 0);
-    fault_flags    : out unsigned(14 downto 0);
-    first_fault    : out unsigned(14 downto 0);
+    fault_ignore   : in  unsigned(15 downto 0);
+    fault_flags    : out unsigned(15 downto 0);
+    first_fault    : out unsigned(15 downto 0);
     fault_stop     : out std_logic;
     gate_clear     : out std_logic
   );
@@ -45,24 +47,25 @@ end entity fault_latch;
 
 architecture rtl of fault_latch is
   -- State
-  signal flags : unsigned(14 downto 0);
-  signal first : unsigned(14 downto 0);
+  signal flags : unsigned(15 downto 0);
+  signal first : unsigned(15 downto 0);
   signal stop  : std_logic;
   signal held  : unsigned(4 downto 0);  -- clocks for which clear_trip clears nothing
-  signal trips : unsigned(14 downto 0);  -- causes that trip, of the last clock
+  signal trips : unsigned(15 downto 0);  -- causes that trip, of the last clock
 
-  signal trips_0    : unsigned(14 downto 0);
-  signal may_0      : unsigned(14 downto 0);  -- 1: the fault trips
+  signal trips_0    : unsigned(15 downto 0);
+  signal may_0      : unsigned(15 downto 0);  -- 1: the fault trips
   signal caused_0   : std_logic;
   signal clear_0    : std_logic;
-  signal now_0      : unsigned(14 downto 0);
-  signal new_0      : unsigned(14 downto 0);
-  signal flags_0    : unsigned(14 downto 0);
-  signal tripping_0 : unsigned(14 downto 0);
+  signal now_0      : unsigned(15 downto 0);
+  signal new_0      : unsigned(15 downto 0);
+  signal flags_0    : unsigned(15 downto 0);
+  signal tripping_0 : unsigned(15 downto 0);
 begin
-  now_0 <= host_lost & current_offset & open_load & motion_faults & sample_early & trip & sample_late & sample_faults;
+  now_0 <= encoder_lost & host_lost & current_offset & open_load & motion_faults & sample_early & trip & sample_late
+           & sample_faults;
 
-  bits : for k in 0 to 14 generate
+  bits : for k in 0 to 15 generate
     new_0(k)      <= now_0(k) when k = FAULT_LATCH_TRIP else now_0(k) and enable;
     may_0(k)      <= '1' when k = FAULT_LATCH_TRIP else '0' when k = FAULT_LATCH_EARLY else not fault_ignore(k);
     trips_0(k)    <= new_0(k) and may_0(k);

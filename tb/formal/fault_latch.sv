@@ -13,11 +13,12 @@ module formal_top (
     input       open_load,
     input       current_offset,
     input       host_lost,
+    input       encoder_lost,
     input       enable,
     input       clear_trip,
-    input [14:0] fault_ignore
+    input [15:0] fault_ignore
 );
-  wire [14:0] fault_flags, first_fault;
+  wire [15:0] fault_flags, first_fault;
   wire fault_stop, gate_clear;
 
   fault_latch dut (
@@ -31,6 +32,7 @@ module formal_top (
       .open_load(open_load),
       .current_offset(current_offset),
       .host_lost(host_lost),
+      .encoder_lost(encoder_lost),
       .enable(enable),
       .clear_trip(clear_trip),
       .fault_ignore(fault_ignore),
@@ -45,10 +47,10 @@ module formal_top (
   always @* if (!begun) assume (rst);
 
   // Bit 7 is trip, which needs no enable and cannot be ignored; bit 8 is a rejected sample, which never trips.
-  localparam [14:0] CAUSES = 15'h7e7f;
-  wire [14:0] cause = {host_lost, current_offset, open_load, motion_faults, 2'b00, sample_late, sample_faults};
+  localparam [15:0] CAUSES = 16'hfe7f;
+  wire [15:0] cause = {encoder_lost, host_lost, current_offset, open_load, motion_faults, 2'b00, sample_late, sample_faults};
   reg rest, was_trip, was_enable, was_clear, was_stop;
-  reg [14:0] was_cause, was_ignore, was_flags, was_first;
+  reg [15:0] was_cause, was_ignore, was_flags, was_first;
   always @(posedge clk) begin
     {rest, was_trip, was_enable, was_clear, was_stop} <= {rst, trip, enable, clear_trip, fault_stop};
     {was_cause, was_ignore} <= {cause, fault_ignore};
@@ -72,7 +74,7 @@ module formal_top (
     if (!was_clear && was_stop && (was_ignore & fault_flags & CAUSES) == 0 && (fault_flags & CAUSES) != 0)
       assert (fault_stop);
     if (was_clear && was_trip) assert (fault_stop);
-    if (fault_flags == 15'h0100) assert (!fault_stop);
+    if (fault_flags == 16'h0100) assert (!fault_stop);
     cover (fault_stop && !was_trip);
     cover (was_stop && !fault_stop);
   end

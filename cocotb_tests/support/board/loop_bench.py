@@ -42,7 +42,9 @@ def with_abz_and_spi(drive: Drive, carrier_half: int, counts: int = COUNTS) -> D
     slow = with_carrier(drive, carrier_half)
     clock = slow.core.clock_hz
     converters = Converters("spi", clock_hz=clock / 4, round_trip_s=3.0 / clock)
-    return replace(slow, encoder=Encoder("abz", counts=counts, filter_s=2.0 / clock, index_passes=1), converters=converters)
+    return replace(
+        slow, encoder=Encoder("abz", counts=counts, filter_s=2.0 / clock, index_passes=1), converters=converters
+    )
 
 
 @dataclass
