@@ -143,6 +143,7 @@ def _incremental(drive: Drive) -> dict:
     correct = max(2, int(CORRECTED * counts / drive.machine.pole_pairs))
     found = {n: (v, "[encoder] counts") for n, v in turn_counter.setting(counts, drive.sensors.position_bits).items()}
     found["correct_max"] = (correct, "[encoder] counts, [machine] pole_pairs")
+    found["index_once"] = (int(e.index_passes == 1), "[encoder] index_passes")
     found["index_phase"] = (e.index_phase or 0, "[encoder] index_phase")
     return found
 

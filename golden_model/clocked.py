@@ -19,7 +19,7 @@ INTERVAL = fluxproof.SAMPLE_INTERVAL
 # clocks after a sample entered -> its values that are valid then
 DUE = {
     name: (fluxproof.schedule()[name][1], fluxproof.outputs_of(name))
-    for name in ("checks", "chopper", "zero_check", "motion", "load", "compare")
+    for name in ("checks", "chopper", "zero_check", "motion", "emf", "load", "compare")
 }
 CHECKS_CLOCKS = DUE["checks"][0]
 
@@ -52,6 +52,7 @@ class Inputs(NamedTuple):
     current_offset: int = 0
     motion_faults: int = 0
     open_load: int = 0
+    encoder_lost: int = 0
     brake_asked: int = 0
     compare_a: int = 0
     compare_b: int = 0
@@ -85,18 +86,13 @@ def step(state, inputs, regs, carrier_half):
     host_state, (host_lost,) = host_watch.step(s.of_host_watch, x.host_write, s.period, r.heartbeat)
     latch_state, (fault_flags, first_fault, fault_stop, gate_clear) = fault_latch.step(
         s.of_fault_latch,
-        x.trip,
-        x.sample_faults,
-        s.sample_late,
-        s.sample_early,
-        x.motion_faults,
-        x.open_load,
-        x.current_offset,
-        s.host_lost,
-        x.enable,
-        x.clear_trip,
-        r.fault_ignore,
-    )
+        fault_latch.Inputs(
+            trip=x.trip, sample_faults=x.sample_faults, sample_late=s.sample_late, sample_early=s.sample_early,
+            motion_faults=x.motion_faults, open_load=x.open_load, current_offset=x.current_offset,
+            host_lost=s.host_lost, encoder_lost=x.encoder_lost, enable=x.enable, clear_trip=x.clear_trip,
+        ),
+        fault_latch.Registers(fault_ignore=r.fault_ignore),
+    )  # fmt: skip
     gate_trip = 1 if x.trip or s.fault_stop or (x.sample_trip and x.enable) else 0
 
     gate_state, (gate_high, gate_low, sample_trigger, running, tripped, setting_refused, _, _, _) = (

@@ -156,7 +156,9 @@ class Protection:
     runaway_rad_s: float | None = positive("rad/s", "mechanical, against the reference; a tenth of rated if none", None)
     runaway_s: float = positive("s", "longest time against the reference without braking", 0.02)
     standstill_rad_s: float | None = positive("rad/s", "mechanical; the shaft stands below; 1 % of rated if none", None)
-    stall_s: float = positive("s", "time at the current limit at standstill that is a stall", 0.5)
+    stall_s: float = positive("s", "time at the current limit at standstill that is a stall", 0.1)
+    encoder_lost_v: float | None = positive("V", "by which the EMF may be wrong at rest; from the data if none", None)
+    encoder_lost_s: float | None = not_negative("s", "so long that the EMF is wrong; 0: no check", None)
     open_load_a: float | None = positive("A", "current that a connected phase reaches; 2 % of rated if none", None)
     current_offset_a: float | None = positive("A", "mean of a phase at rest; 1 % of the rated current if none", None)
     heartbeat_s: float = not_negative("s", "longest time without a write of the host; 0: no limit", 0.0)
@@ -171,9 +173,10 @@ class Protection:
     trip_watchdog: bool = flag("false: reported, no trip", True)
     trip_overspeed: bool = flag("false: reported, no trip", True)
     trip_runaway: bool = flag("false: reported, no trip", True)
-    trip_stall: bool = flag("true: a stall trips", False)
+    trip_stall: bool = flag("false: reported, no trip; for a drive that holds a torque at rest in speed mode", True)
     trip_open_load: bool = flag("true: an open load trips", False)
     trip_current_offset: bool = flag("false: reported, no trip", True)
+    trip_encoder_lost: bool = flag("false: reported, no trip", True)
     trip_host_lost: bool = flag("false: reported, no trip", True)
 
 

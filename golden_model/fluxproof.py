@@ -43,6 +43,7 @@ from golden_model.formats import PU
 from golden_model.io import (
     brake_chopper,
     current_conditioning,
+    emf_check,
     fault_latch,
     host_watch,
     load_check,
@@ -104,6 +105,7 @@ WIRING = {
     "checks": (sample_checks, ("conditioning", "bus_voltage")),
     "zero_check": (offset_check, ("conditioning", "speed_measurement")),
     "motion": (motion_checks, ("speed_regulator",)),
+    "emf": (emf_check, ("circle",)),
     "load": (load_check, ("motion", "conditioning", "angle")),
     "chopper": (brake_chopper, ("bus_voltage",)),
 }
@@ -211,6 +213,7 @@ class State(NamedTuple):
     of_sample_checks: sample_checks.State = sample_checks.State()
     of_offset_check: offset_check.State = offset_check.State()
     of_motion_checks: motion_checks.State = motion_checks.State()
+    of_emf_check: emf_check.State = emf_check.State()
     of_load_check: load_check.State = load_check.State()
     of_brake_chopper: brake_chopper.State = brake_chopper.State()
     # Outputs that the next sample reads: the feedback paths of the top entity.
@@ -294,6 +297,7 @@ class Observed(NamedTuple):
     current_offset: int
     motion_faults: int
     open_load: int
+    encoder_lost: int
     brake_asked: int
     speed_was_given: int
     position_restarted: int
@@ -311,18 +315,22 @@ NOTHING_GIVEN, NOTHING_ESTIMATED = estimation.ForControl(), estimation.Estimated
 
 
 class Given(NamedTuple):
-    """What the speed of one sample came from; registers, which the front ends of a board set for each sample."""
+    """Registers that the front ends of a board set for each sample: what its speed came from, and whether the EMF can
+    be checked.
+    """
 
     speed_given: int
     omega_given: int
     position_restart: int
+    emf_samples: int
 
 
 @kernel
 def step(state, sample, regs, config):
     """One control period: (next state, Observed)."""
     given = Given(
-        speed_given=regs.speed_given, omega_given=regs.omega_given, position_restart=regs.position_restart
+        speed_given=regs.speed_given, omega_given=regs.omega_given, position_restart=regs.position_restart,
+        emf_samples=regs.emf_samples,
     )  # fmt: skip
     return step_given(state, sample, regs, config, given)
 
@@ -410,6 +418,16 @@ def step_given(state, sample, regs, config, of_speed):
         state.of_motion_checks, omega_me, x.omega_ref, x.speed_mode, speed_limited, x.run, r.omega_trip, r.omega_away,
         r.runaway_samples, r.omega_stall, r.stall_samples,
     )  # fmt: skip
+    emf_check_state, (encoder_lost,) = emf_check.step(
+        state.of_emf_check,
+        emf_check.Inputs(
+            u_d=u_d, u_q=u_q, u_comp_d=given.u_comp_d, u_comp_q=given.u_comp_q, i_d=i_d, i_q=i_q, model_d=model_d,
+            model_q=model_q, omega_me=omega_me, run=x.run,
+        ),
+        emf_check.Registers(
+            r_s=r.r_s, emf_min=r.emf_min, emf_l=r.emf_l, emf_i=r.emf_i, emf_w=r.emf_w, emf_samples=of_speed.emf_samples
+        ),
+    )  # fmt: skip
     load_check_state, (open_load,) = load_check.step(
         state.of_load_check, i_a, i_b, i_c, i_q_ref, theta_me, x.run, motion_faults, r.i_open
     )
@@ -421,7 +439,8 @@ def step_given(state, sample, regs, config, of_speed):
         of_delta_lambda=after.of_delta_lambda, of_flux_compensation=after.of_flux_compensation,
         of_flux_monitor=after.of_flux_monitor, of_v_dead_adaline=after.of_v_dead_adaline,
         of_psi_adaline=after.of_psi_adaline, of_clean_voltage=after.of_clean_voltage, of_sample_checks=checks_state,
-        of_offset_check=offset_check_state, of_motion_checks=motion_checks_state, of_load_check=load_check_state,
+        of_offset_check=offset_check_state, of_motion_checks=motion_checks_state,
+        of_emf_check=emf_check_state, of_load_check=load_check_state,
         of_brake_chopper=brake_chopper_state, sat_d=sat_d, sat_q=sat_q, compare_a=compare_a, compare_b=compare_b,
         compare_c=compare_c, lambda_m_alpha=after.lambda_m_alpha, lambda_m_beta=after.lambda_m_beta,
         merge_known=after.merge_known, lambda_pi_d=after.lambda_pi_d, lambda_pi_q=after.lambda_pi_q,
@@ -441,7 +460,8 @@ def step_given(state, sample, regs, config, of_speed):
         flux_faults=e.flux_faults, d_d=e.d_d, d_q=e.d_q, v_dead=e.v_dead, v_comp=e.v_comp,
         v_comp_limited=e.v_comp_limited, psi_m=e.psi_m, psi_held=e.psi_held, temp_lost=e.temp_lost,
         sample_faults=sample_faults, sample_trip=sample_trip, current_offset=current_offset,
-        motion_faults=motion_faults, open_load=open_load, brake_asked=brake_asked, speed_was_given=speed_was_given,
+        motion_faults=motion_faults, open_load=open_load, encoder_lost=encoder_lost, brake_asked=brake_asked,
+        speed_was_given=speed_was_given,
         position_restarted=position_restarted, code_a=x.adc_a, code_b=x.adc_b, code_c=x.adc_c, code_u_dc=x.adc_u_dc,
         code_theta=x.position_code, compare_a=compare_a, compare_b=compare_b, compare_c=compare_c,
     )  # fmt: skip

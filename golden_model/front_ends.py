@@ -11,7 +11,7 @@ from golden_model.drive_keys import DriveError, choice, flag, not_negative, posi
 # kind -> (keys it needs, keys it may have besides)
 ENCODERS = {
     "code": ((), ()),
-    "abz": (("counts",), ("filter_s", "index_phase")),
+    "abz": (("counts",), ("filter_s", "index_phase", "index_passes")),
     "hall": ((), ("filter_s",)),
     "ssi": (("bits", "clock_hz"), ("turns_bits", "crc", "gray", "pause_s", "bridge_samples")),
     "biss": (("bits", "clock_hz"), ("turns_bits", "crc", "start_s", "pause_s", "bridge_samples")),
@@ -51,6 +51,9 @@ class Encoder:
     pause_s: float | None = not_negative("s", "ssi, biss, endat: rest of the clock after a frame, data sheet", None)
     bridge_samples: int = whole(0, 255, "ssi, biss, endat: samples without a good frame that are bridged", 3)
     filter_s: float | None = not_negative("s", "abz, hall: shorter pulses on a pin have no effect", None)
+    index_passes: int = whole(
+        1, 2, "abz: passes of the index until it is believed; 1 where the shaft cannot turn on", 2
+    )
     index_phase: int | None = whole(0, 3, "abz: quarter of a line in which Z counts; A, B = 00, 10, 11, 01", None)
 
 

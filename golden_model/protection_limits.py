@@ -4,16 +4,20 @@
 The default limits lie outside the range of a healthy drive: overcurrent at twice the current limit, the
 sum of the currents at a fifth of the rated current, the bus at a tenth and 1.3 times its nominal value, no sample for
 1.5 periods, 1.2 times the rated speed, a tenth of it against the reference for 20 ms without braking, a sensor that
-shows 1 % of the rated current at rest. A stall and an open load are reported and do not trip: the current is within
-its limit. The position may deviate from its linear extrapolation by 5e-4 turn plus four codes, or four counts of an
+shows 1 % of the rated current at rest, a stall of 0.1 s, an encoder that contradicts the EMF for 3 ms or 1.5 over the
+bandwidth of the current loop. An open load is reported and does not trip. The position may deviate from its linear extrapolation by 5e-4 turn plus four codes, or four counts of an
 incremental encoder: no shaft accelerates that much within a sample, and a frozen code is detected from that rotation
 per sample on.
 """
 
+import math
+
 from golden_model.formats import LIMIT
+from golden_model.io.emf_check import EMF_I, EMF_L, EMF_MIN, EMF_W, MEAN
+from golden_model.io.emf_check import SAMPLES as EMF_SAMPLES
 from golden_model.io.fault_latch import NAMES
 from golden_model.io.offset_check import OFFSET
-from golden_model.scale_entry import Entry, base_keys
+from golden_model.scale_entry import Entry, base_keys, leg_loss_v
 from golden_model.units import TURN_RAD
 
 TRIP_OF_LIMIT, TRIP_OF_RANGE = 2.0, 0.98  # overcurrent: of the current limit, at most of the sensors' range
@@ -23,6 +27,11 @@ OVERSPEED, AWAY, STANDS = 1.2, 0.1, 0.01  # of the rated speed: trips; looked fo
 OPEN_OF_RATED, OFFSET_OF_RATED = 0.02, 0.01  # of the rated current: of a connected phase; of a sensor at rest
 BRAKE_HYSTERESIS = 0.97  # of the voltage that switches the brake resistor on: off below
 JUMP_CODES, JUMP_TURN = 4, 5e-4  # of the position, per sample: quantisation of the code, and noise of the sensor
+# The EMF may be wrong by: of that at rated speed; of the voltage of dead time and devices, a six-step vector of 4/3 of
+# the leg's; of R*i, for a hot winding; of the flux; of L*i at the limit.  Hall sensors: 30 degrees within a sector.
+EMF_OF_RATED, EMF_OF_LEG, EMF_OF_R, EMF_OF_PSI, EMF_OF_LI, EMF_OF_PSI_HALL = 0.02, 1.6, 0.5, 0.3, 0.3, 0.8
+# So long at least; over the bandwidth of the current loop; with Hall sensors; sectors in that time whose EMF is not seen
+EMF_S, EMF_OF_LOOP, EMF_HALL_S, EMF_SECTORS = 3e-3, 1.5, 0.05, 2.0
 ALWAYS_REPORTED = ("trip", "early")  # the pin always trips, a rejected sample never does
 
 
@@ -54,7 +63,38 @@ def protection(drive):
     keys = "[protection] watchdog_periods; [inverter] pwm_frequency_hz; [core] clock_hz"
     yield Entry("watchdog", p.watchdog_periods * drive.sample_time_s, "s", 1.0 / drive.core.clock_hz, keys)
     yield from motion_limits(drive)
+    yield from emf_limits(drive)
     yield from brake_limits(drive)
+
+
+def emf_limits(drive):
+    """By how much the voltage may contradict angle and speed, and for how long."""
+    p, b, m, i, t_s = drive.protection, drive.bases, drive.machine, drive.inverter, drive.sample_time_s
+    hall, scale, sample = drive.encoder.kind == "hall", b.voltage_v / b.current_a, "[inverter] pwm_frequency_hz"
+    volts, key = p.encoder_lost_v, "[protection] encoder_lost_v"
+    if volts is None:
+        volts = EMF_OF_RATED * m.magnet_flux_wb * m.pole_pairs * m.rated_speed_rad_s + EMF_OF_LEG * leg_loss_v(drive)
+        if hall:  # a sector may last as long before its edge shows the speed
+            volts += EMF_SECTORS * math.pi / 3.0 / EMF_HALL_S * m.magnet_flux_wb
+        key = "[machine] magnet_flux_wb, rated_speed_rad_s; [inverter] dead_time_s"
+    yield _fitting("emf_min", volts, "V", b.voltage_v, EMF_MIN, key)
+    henry, keys = (m.inductance_d_h + m.inductance_q_h) / 2.0, "[machine] inductance_d_h, inductance_q_h"
+    yield _fitting("emf_l", henry / (2**MEAN * t_s), "ohm", scale, EMF_L, f"{keys}; {sample}")
+    ohm = EMF_OF_R * m.resistance_ohm + max(i.r_switch_ohm, i.r_diode_ohm)
+    yield _fitting("emf_i", ohm, "ohm", scale, EMF_I, "[machine] resistance_ohm; [inverter] r_switch_ohm, r_diode_ohm")
+    flux = (EMF_OF_PSI_HALL if hall else EMF_OF_PSI) * m.magnet_flux_wb
+    flux += EMF_OF_LI * max(m.inductance_d_h, m.inductance_q_h) * drive.current_limit_a
+    yield _fitting("emf_w", flux, "Wb", b.flux_wb, EMF_W, f"[machine] magnet_flux_wb; {keys}")
+    lasts = p.encoder_lost_s
+    if lasts is None:
+        lasts = EMF_HALL_S if hall else max(EMF_S, EMF_OF_LOOP / (drive.control.current_bandwidth_hz or math.inf))
+        lasts = min(lasts, EMF_SAMPLES.hi * t_s)
+    yield Entry("emf_samples", lasts, "s", t_s, f"[protection] encoder_lost_s; {sample}")
+
+
+def _fitting(name, value, unit, base, fmt, keys):
+    """A value of ``base`` in ``fmt``, clipped to its range: a limit that nothing reaches, or that all reach."""
+    return Entry(name, min(max(value, fmt.lsb * base), fmt.hi * fmt.lsb * base), unit, base, keys)
 
 
 def motion_limits(drive):

@@ -23,3 +23,9 @@ def base_keys(drive, *names):
     }
     given = {name: f"[bases] {name}" for name in names if getattr(drive.base_choice, name) is not None}
     return "; ".join({**origin, **given}[name] for name in names)
+
+
+def leg_loss_v(drive):
+    """Leg voltage loss by dead time and device drops, calculated from the drive's data [V]."""
+    i = drive.inverter
+    return i.dead_time_s * i.pwm_frequency_hz * i.dc_bus_v + (i.v_switch_v + i.v_diode_v) / 2.0

@@ -26,7 +26,7 @@ docs/board.md.
 import math
 
 from golden_model.protection_limits import protection
-from golden_model.scale_entry import Entry, base_keys
+from golden_model.scale_entry import Entry, base_keys, leg_loss_v
 from golden_model.units import TURN_RAD
 
 INTEGRAL_CORNER = 5.0  # speed crossover over the corner of the speed regulator's integral
@@ -183,12 +183,6 @@ def flux_estimator(drive):
         keys = "[machine] magnet_flux_wb, inductance_q_h, rated_current_a"
     yield Entry("delta_max", limit, "Wb", b.flux_wb, f"{keys}; {base_keys(drive, 'voltage_v', 'omega_me_rad_s')}")
     yield Entry("flux_mode", c.flux_mode, "1", 1.0, "[control] flux_mode")
-
-
-def leg_loss_v(drive):
-    """Leg voltage loss by dead time and device drops, calculated from the drive's data [V]."""
-    i = drive.inverter
-    return i.dead_time_s * i.pwm_frequency_hz * i.dc_bus_v + (i.v_switch_v + i.v_diode_v) / 2.0
 
 
 def vsi_estimators(drive):

@@ -45,8 +45,8 @@ entity fluxproof is
     tripped         : out std_logic;  -- 1: a trip is latched
     sample_busy     : out std_logic;  -- a sample is in flight: settings must not change
     brake           : out std_logic;  -- brake resistor on
-    fault_flags     : out unsigned(14 downto 0);  -- faults since the last clear_trip, see fault_latch
-    first_fault     : out unsigned(14 downto 0);  -- faults that tripped first
+    fault_flags     : out unsigned(15 downto 0);  -- faults since the last clear_trip, see fault_latch
+    first_fault     : out unsigned(15 downto 0);  -- faults that tripped first
     early_samples   : out unsigned(7 downto 0);  -- samples rejected because they came too early
     setting_refused : out std_logic;  -- 1: dead_time and min_pulse contradict each other, refused
     min_pulse_used  : out unsigned(11 downto 0);  -- minimum pulse in force
@@ -414,13 +414,16 @@ begin
     generic map (POSITION_BITS => POSITION_BITS)
     port map (clk => clk, rst => rst, sample_valid => sample_valid, current_valid => current_valid,
               dc_valid => dc_valid, omega_valid => omega_valid, reference_valid => reference_valid,
+              voltage_valid => dq_voltage_valid,
               i_a => o.i_a, i_b => o.i_b, i_c => o.i_c, current_at_rail => o.current_at_rail, u_dc => o.u_dc,
               u_dc_at_rail => o.u_dc_at_rail, code_theta => code_theta, theta_me => o.theta_me, omega_me => o.omega_me,
               omega_ref => omega_ref, speed_mode => speed_mode, i_q_ref => o.i_q_ref, speed_limited => o.speed_limited,
+              u_d => o.u_d, u_q => o.u_q, u_comp_d => e.u_comp_d, u_comp_q => e.u_comp_q, i_d => o.i_d, i_q => o.i_q,
+              model_d => model_d, model_q => model_q,
               run => run, trip => trip, enable => enable, clear_trip => clear_trip, host_write => host_write,
               period => period, settings => settings, sample_busy => guard_busy, early_samples => early_samples,
               sample_faults => o.sample_faults, sample_trip => o.sample_trip, motion_faults => o.motion_faults,
-              open_load => o.open_load, current_offset => o.current_offset, brake_asked => o.brake_asked,
+              open_load => o.open_load, encoder_lost => o.encoder_lost, current_offset => o.current_offset, brake_asked => o.brake_asked,
               fault_flags => fault_flags, first_fault => first_fault, gate_trip => gate_trip, gate_clear => gate_clear,
               brake => brake);
 

@@ -34,6 +34,7 @@ from fluxproof.plant.sensors import current_code
 from golden_model.board_registers import board_set
 from golden_model.fluxproof import Observed, Sample
 from golden_model.generated.register_names import ADDRESSES
+from golden_model.io.board_faults import NAMES
 from golden_model.io.fault_latch import TRIP
 from golden_model.io.telemetry_words import COUNT, pack
 
@@ -55,7 +56,23 @@ def test_closed_loop_in_ghdl(tmp_path):
     facts = in_ghdl(130, "standstill, short periods", tmp_path)
     assert facts["clocks"] > 130 * 160 and facts["samples"] > 90 and facts["rpm"] > 50
     assert facts["encoder_flags"] & 1 and facts["index_count"] > 0 and facts["illegal_count"] == 0
-    assert facts["board_flags"] == 0 and facts["snap_ready"] == 1
+    assert facts["board_flags"] == 1 << NAMES.index("no_index") and facts["snap_ready"] == 1, "told before the index"
+
+
+@pytest.mark.parametrize(("run", "after"), [
+    ("before the index", 16),
+    ("clear at a trip", 44),
+    ("Hall sensors: 111 at enable", 12),
+    pytest.param("Hall sensors: 111", 12, marks=pytest.mark.slow),
+    pytest.param("Hall sensors: 000", 12, marks=pytest.mark.slow),
+    ("Hall sensors: skipped", 12),
+])  # fmt: skip
+def test_faults_of_the_board_in_ghdl(run, after, tmp_path):
+    """What turns the gates off by name, through the pins: every clock as the golden board (test_front_ends judges)."""
+    periods = RUNS[run]().settled + after
+    facts = in_ghdl(periods, run, tmp_path)
+    stopped = run not in ("clear at a trip", "before the index")
+    assert facts["clocks"] > 0 and (facts["board_first"] == 1 << NAMES.index("hall_code")) == stopped
 
 
 @pytest.mark.parametrize("run", ["faults, serial and modulators", "faults, edges"])
@@ -152,7 +169,8 @@ def test_start_from_standstill_in_verilator(figure):
             assert chunk.seen[:, SEEN.index("irq")].max() == 0
     seen = status(chunk)
     assert fastest == pytest.approx(RPM, rel=0.1) and chunk.omega_m < -0.9 * RPM * 2 * np.pi / 60
-    assert seen["lost_counts"] == seen["illegal_count"] == seen["board_flags"] == 0 and seen["snap_ready"] == 1
+    assert seen["lost_counts"] == seen["illegal_count"] == 0 and seen["snap_ready"] == 1
+    assert seen["board_flags"] == 1 << NAMES.index("no_index"), "told before the index, nothing else"
     for name in ("snap_ready", "snap_code", "snap_count", "snap_flags", "snap_adc_a", "snap_adc_u_dc"):
         assert read_register(core, name) == seen[name], name
     assert all(abs(seen[f"snap_adc_{x}"] - code) < 300 for x, code in codes.items())

@@ -10,6 +10,7 @@ import sys
 
 from cocotb_tests.support.board.fault_cases import MOVED, RATE
 from fluxproof.checkout import ROOT
+from golden_model.io.board_faults import NAMES
 from golden_model.io.fault_latch import TRIP
 
 
@@ -24,15 +25,42 @@ def run(case: str) -> dict:
 def test_a_wrong_index_stops_the_drive_by_name():
     facts = run("index_wrong")
     assert facts["moved"] and facts["encoder_flags"] & 0b1001 == 0b1001 and facts["index_count"] == MOVED
-    assert facts["board_first"] == facts["board_flags"] == 1
+    assert facts["board_first"] == 1 and facts["board_flags"] & 0b111 == 1
     assert facts["first_fault"] == 1 << TRIP and facts["irq"] == 1
     assert facts["clocks_to_off"] <= 4
 
 
 def test_a_forced_position_turns_and_the_encoder_is_read_beside_it():
     facts = run("forced")
-    assert facts["steps"] == [RATE >> 16] and facts["fault_flags"] == facts["board_flags"] == 0
+    assert facts["steps"] == [RATE >> 16] and facts["fault_flags"] == 0
+    assert facts["board_flags"] == 1 << NAMES.index("no_index"), "told when the encoder's code is back, ignored here"
     assert facts["snap_ready"] == 1 and facts["forced"] == 0
     assert facts["snap_position"] > 0.05 * 2**16 and abs(facts["snap_code"] - facts["snap_position"]) > 100
     assert abs(facts["after"] - facts["snap_code"]) < 400, "the encoder's code is back"
     assert max(map(abs, facts["currents"])) > 0.5
+
+
+def test_no_torque_before_the_index():
+    """Enabled before its index the drive never switches a gate and says why; the angle that the host gives may."""
+    facts = run("no_index")
+    assert facts["gates_before"] == 0 and facts["first_fault"] == 1 << TRIP
+    assert facts["board_first"] == 1 << NAMES.index("no_index") and facts["refused_again"] == 0
+    assert facts["gates_forced"] > 0
+
+
+def test_a_trip_beats_a_clear():
+    """A pulse at the pin trip within the clocks that a write of clear_trip takes: the drive stays off until later."""
+    facts = run("trip_against_clear")
+    assert facts["running_before"] and facts["after"] == [0] * len(facts["after"]) and len(facts["after"]) == 12
+    assert facts["first_faults"] == [1 << TRIP] * 12 and facts["running_at_last"]
+
+
+def test_hall_codes_stop_the_drive_by_name():
+    """Code 111 refuses the enable; a code that skips a sector, one line at 0 and 111 while it runs turn it off."""
+    facts = run("hall_code")
+    code = 1 << NAMES.index("hall_code")
+    for name in ("111 at enable", "111", "000", "skipped"):
+        seen = facts[name]
+        assert seen["board_first"] == code and seen["gates_after"] == 0, (name, seen)
+        assert seen["ran"] == (name != "111 at enable"), (name, seen)
+    assert facts["good"]["board_first"] == 0 and facts["good"]["ran"] and facts["good"]["gates_after"] > 0

@@ -231,3 +231,17 @@ def test_a_refused_register_is_named(drive, program):
     board.write = lambda address, word: 2 if address == 0x170 else 0
     done = board.run(program)
     assert done.returncode == 1 and "refused" in done.stderr and "at 0x170" in done.stderr, done.stderr
+
+
+@pytest.mark.parametrize(("looks", "status"), [(60, 0), (0, 1)])
+def test_the_index_is_looked_for_before_the_encoder_is_believed(tmp_path, monkeypatch, looks, status):
+    """With an A/B/Z encoder a field of the host's is turned until the index is there; without it the gates go off."""
+    drive = drives.load(DRIVES / "servo_24v.toml")
+    bus = ROOT / "cocotb_tests" / "support" / "host" / "bus_memory.c"
+    program = compiled(tmp_path, drive, bus)
+    monkeypatch.setenv("FLUXPROOF_INDEX_AFTER", str(looks))
+    done = subprocess.run([program, "0"], capture_output=True, text=True)
+    assert done.returncode == status, done.stdout + done.stderr
+    assert ("index found" in done.stdout) == (status == 0)
+    if status:
+        assert "no index in 2.2 turns" in done.stderr

@@ -229,7 +229,7 @@ def test_defaults_of_the_drive_file():
     assert values.i_trip == round(256 * 2 * 5.23 / 12.5) and values.sum_trip == round(256 * 0.2 * 5.23 / 12.5)
     assert (values.u_dc_min, values.u_dc_max) == (round(256 * 56.3 / 500), round(256 * 1.3 * 563 / 500))
     assert values.jump_max == round((4 / 65536 + 5e-4) * 8192) and values.watchdog == 30000
-    assert (values.rail_samples, values.fault_ignore) == (3, 1 << 11 | 1 << 12)  # a stall, an open load: told
+    assert (values.rail_samples, values.fault_ignore) == (3, 1 << 12)  # an open load: told
 
 
 def with_protection(tmp_path, lines):
@@ -244,7 +244,7 @@ def test_protection_keys(tmp_path):
         round(8 / 12.5 * 256),
         round(700 / 500 * 256),
     )
-    assert row_of(path, "fault_ignore").integer == 0b1100001001000
+    assert row_of(path, "fault_ignore").integer == 0b1000001001000
     assert row_of(with_protection(tmp_path, "position_jump_rad = 0.01"), "jump_max").integer == 13
     assert row_of(with_protection(tmp_path, "watchdog_periods = 3"), "watchdog").integer == 60000
 

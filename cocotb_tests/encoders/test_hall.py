@@ -65,7 +65,7 @@ def test_start_of_an_incremental_encoder(counts, pole_pairs):
         ).play({**sensors(turns), "settled": np.ones(len(turns), np.int64)})
         assert hall["start_valid"][20:].all()
         start = (np.arange(len(turns)) == 30).astype(np.int64)
-        regs = turn_counter.setting(counts, 16) | {"filter_clocks": 1, "correct_max": 10}
+        regs = turn_counter.setting(counts, 16) | {"filter_clocks": 1, "correct_max": 10, "index_once": 1}
         encoder = GoldenPlayer(incremental_encoder.BLOCK, {"POSITION_BITS": 16}, regs)
         pins = Incremental(counts).pins(place, rng)
         out = encoder.play({**pins, "start": start, "start_count": hall["start_count"]})

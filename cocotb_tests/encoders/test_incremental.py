@@ -22,7 +22,7 @@ CLOCK_HZ, POLE_PAIRS, OMEGA_BASE = 100e6, 4, 2 * np.pi * 4 * 100.0
 
 
 def player(counts: int, **registers: int) -> GoldenPlayer:
-    regs = {"filter_clocks": FILTER, "index_phase": 0, "correct_max": 40, "reverse": 0}
+    regs = {"filter_clocks": FILTER, "index_phase": 0, "correct_max": 40, "reverse": 0, "index_once": 1}
     regs |= turn_counter.setting(counts, BITS)
     regs["k_edge"] = edge_timer.setting(counts, POLE_PAIRS, CLOCK_HZ, OMEGA_BASE)
     return GoldenPlayer(incremental_encoder.BLOCK, {"POSITION_BITS": BITS}, regs | registers)
@@ -159,6 +159,34 @@ def test_a_wrong_index_is_not_followed():
     after = device.play(moved.pins(path, rng))
     assert after["index_wrong"][-1] == 0 and after["referenced"][-1] == 1
     assert abs(after["count"][-1] - (path[-1] - 100 - DELAY * 0.05) % counts) <= 1.0
+
+
+@pytest.mark.parametrize("z", ["good", "dead", "stuck", "spike at rest", "spike on the way", "turns back"])
+def test_the_index_is_believed_at_its_second_pass(z):
+    """Two passes of one place, a turn or a reversal apart; a spike of 300 ns, a stuck or a dead Z make no angle."""
+    counts, speed = 400, 0.05
+    turns = 2.6 if z == "spike on the way" else 2.2
+    path = 100.0 + np.concatenate([np.zeros(200), speed * np.arange(int(turns * counts / speed))])
+    if z == "turns back":
+        path[-8000:] = 430.0 + np.abs(np.arange(8000) - 4000) * 0.02 - 70.0
+        path = np.concatenate([path[:6000], np.linspace(path[5999], path[-8000], 4000), path[-8000:]])
+    pins = Incremental(counts).pins(path, np.random.default_rng(1))
+    if z in ("dead", "stuck"):
+        pins["pin_z"][:] = z == "stuck"
+    spikes = {"spike at rest": 100, "spike on the way": 2000}
+    if z in spikes:
+        pins["pin_z"][spikes[z] : spikes[z] + 80] = 1  # a line long at this speed: every phase
+    out = player(counts, index_once=0, correct_max=8).play(pins)
+    believed = out["referenced"]
+    if z in ("dead", "stuck"):
+        assert not believed.any()
+        return
+    at = np.flatnonzero(believed)[0]
+    passes = np.flatnonzero(np.diff(pins["pin_z"]) == 1)
+    assert at > passes[1] and believed[at:].all() and not out["index_wrong"].any()
+    rows = slice(at + 600, None)  # the count has arrived
+    off = (out["count"][rows] - np.floor(path[rows]) + counts / 2) % counts - counts / 2
+    assert np.abs(off).max() <= 2
 
 
 @pytest.mark.parametrize("sign", [1, -1])

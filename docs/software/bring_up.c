@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-/* Brings a drive up over its registers: is it the right core, load the drive, check, enable, ramp the speed or the
+/* Brings a drive up over its registers: is it the right core, load the drive, check, find the index, enable, ramp the speed or the
  * torque current up and down, read back, stop.  The gates are off before it starts and, whatever goes wrong, when it
- * ends: Ctrl-C, SIGTERM and a bus error included.
+ * ends: Ctrl-C, SIGTERM and a bus error included.  With an A/B/Z encoder it first looks for the index: the shaft turns.
  *
  *   fluxproof registers drive.toml --format c > drive_registers.h
  *   cc -Wall -Wextra -I docs/software -I . docs/software/bring_up.c docs/software/bus_uio.c -lm -o bring_up
@@ -268,6 +268,45 @@ static void push_with(double current, double most_rpm)
     ramp(AT(i_q_ext), lsb, current, 0.0, most_rpm);
 }
 
+#if defined(FLUXPROOF_ENCODER) && (FLUXPROOF_ENCODER == 1 || FLUXPROOF_ENCODER == 3)
+/* An A/B/Z encoder knows its angle when it has passed its index and met it again (index_once = 1: at the first pass);
+ * before, the gates are off by no_index.  A field that the host turns takes the rotor there, with 0.6 of the current
+ * limit: a turn of the shaft in 0.8 s, at most 6 electrical turns a second. */
+static void find_index(void)
+{
+    if (get(AT(encoder_flags)) & 1)
+        return;
+    uint32_t most = get(AT(i_max)) * 6 / 10;
+    double turn_s = fmax(0.8, get(AT(pole_pairs)) / 6.0), turns = get(AT(index_once)) ? 1.2 : 2.2;
+    uint32_t mode = get(AT(speed_mode));
+    put(AT(speed_mode), 0);
+    put(AT(forced_angle), 0);
+    put(AT(forced_rate), 0);
+    put(AT(position_source), 1);
+    enable_gates();
+    ramp(AT(i_d_ref), 1.0, 0.0, most, HUGE_VAL);
+    put(AT(forced_rate), (uint32_t)lround(4294967296.0 * FLUXPROOF_BASE_SAMPLE_TIME_S / turn_s));
+    bool found = false;
+    for (int k = 0; k < turns * turn_s * 1e6 / STEP_US && !found; k++) {
+        wait_us(STEP_US);
+        check_running(HUGE_VAL);
+        found = get(AT(encoder_flags)) & 1;
+    }
+    put(AT(enable), 0);
+    put(AT(i_d_ref), 0);
+    put(AT(forced_rate), 0);
+    put(AT(position_source), 0);
+    put(AT(speed_mode), mode);
+    if (!found)
+        fail("no index in %.1f turns, or not twice at the same place: check the line Z and index_phase", turns);
+    printf("index found\n");
+}
+#else
+static void find_index(void)
+{
+}
+#endif
+
 static void stop(void)
 {
     put(AT(enable), 0);
@@ -290,6 +329,7 @@ int main(int argc, char **argv)
     check_generics();
     load_drive(!torque_mode);
     check_at_rest();
+    find_index();
     enable_gates();
     if (torque_mode)
         push_with(atof(argv[1]), atof(argv[3]));

@@ -268,14 +268,14 @@ extern "C" {
 #define FLUXPROOF__TELEMETRY_DROPPED__VALUE_bw 16
 
 // reg - fluxproof::fault_flags
-#define FLUXPROOF__FAULT_FLAGS__VALUE_bm 0x7fff
+#define FLUXPROOF__FAULT_FLAGS__VALUE_bm 0xffff
 #define FLUXPROOF__FAULT_FLAGS__VALUE_bp 0
-#define FLUXPROOF__FAULT_FLAGS__VALUE_bw 15
+#define FLUXPROOF__FAULT_FLAGS__VALUE_bw 16
 
 // reg - fluxproof::first_fault
-#define FLUXPROOF__FIRST_FAULT__VALUE_bm 0x7fff
+#define FLUXPROOF__FIRST_FAULT__VALUE_bm 0xffff
 #define FLUXPROOF__FIRST_FAULT__VALUE_bp 0
-#define FLUXPROOF__FIRST_FAULT__VALUE_bw 15
+#define FLUXPROOF__FIRST_FAULT__VALUE_bw 16
 
 // reg - fluxproof::early_samples
 #define FLUXPROOF__EARLY_SAMPLES__VALUE_bm 0xff
@@ -499,9 +499,9 @@ extern "C" {
 #define FLUXPROOF__WATCHDOG__VALUE_reset 0x0
 
 // reg - fluxproof::fault_ignore
-#define FLUXPROOF__FAULT_IGNORE__VALUE_bm 0x7fff
+#define FLUXPROOF__FAULT_IGNORE__VALUE_bm 0xffff
 #define FLUXPROOF__FAULT_IGNORE__VALUE_bp 0
-#define FLUXPROOF__FAULT_IGNORE__VALUE_bw 15
+#define FLUXPROOF__FAULT_IGNORE__VALUE_bw 16
 #define FLUXPROOF__FAULT_IGNORE__VALUE_reset 0x0
 
 // reg - fluxproof::flux_mode
@@ -750,6 +750,36 @@ extern "C" {
 #define FLUXPROOF__BRAKE_OFF__VALUE_bw 9
 #define FLUXPROOF__BRAKE_OFF__VALUE_reset 0x0
 
+// reg - fluxproof::emf_min
+#define FLUXPROOF__EMF_MIN__VALUE_bm 0x1ffff
+#define FLUXPROOF__EMF_MIN__VALUE_bp 0
+#define FLUXPROOF__EMF_MIN__VALUE_bw 17
+#define FLUXPROOF__EMF_MIN__VALUE_reset 0x0
+
+// reg - fluxproof::emf_i
+#define FLUXPROOF__EMF_I__VALUE_bm 0x7fffff
+#define FLUXPROOF__EMF_I__VALUE_bp 0
+#define FLUXPROOF__EMF_I__VALUE_bw 23
+#define FLUXPROOF__EMF_I__VALUE_reset 0x0
+
+// reg - fluxproof::emf_w
+#define FLUXPROOF__EMF_W__VALUE_bm 0xffffff
+#define FLUXPROOF__EMF_W__VALUE_bp 0
+#define FLUXPROOF__EMF_W__VALUE_bw 24
+#define FLUXPROOF__EMF_W__VALUE_reset 0x0
+
+// reg - fluxproof::emf_samples
+#define FLUXPROOF__EMF_SAMPLES__VALUE_bm 0xfff
+#define FLUXPROOF__EMF_SAMPLES__VALUE_bp 0
+#define FLUXPROOF__EMF_SAMPLES__VALUE_bw 12
+#define FLUXPROOF__EMF_SAMPLES__VALUE_reset 0x0
+
+// reg - fluxproof::emf_l
+#define FLUXPROOF__EMF_L__VALUE_bm 0xffffff
+#define FLUXPROOF__EMF_L__VALUE_bp 0
+#define FLUXPROOF__EMF_L__VALUE_bw 24
+#define FLUXPROOF__EMF_L__VALUE_reset 0x0
+
 // reg - fluxproof::double_update
 #define FLUXPROOF__DOUBLE_UPDATE__VALUE_bm 0x1
 #define FLUXPROOF__DOUBLE_UPDATE__VALUE_bp 0
@@ -802,9 +832,9 @@ extern "C" {
 #define FLUXPROOF__FORCED_RATE__VALUE_reset 0x0
 
 // reg - fluxproof::board_ignore
-#define FLUXPROOF__BOARD_IGNORE__VALUE_bm 0x7
+#define FLUXPROOF__BOARD_IGNORE__VALUE_bm 0x1f
 #define FLUXPROOF__BOARD_IGNORE__VALUE_bp 0
-#define FLUXPROOF__BOARD_IGNORE__VALUE_bw 3
+#define FLUXPROOF__BOARD_IGNORE__VALUE_bw 5
 #define FLUXPROOF__BOARD_IGNORE__VALUE_reset 0x0
 
 // reg - fluxproof::encoder_flags
@@ -853,14 +883,14 @@ extern "C" {
 #define FLUXPROOF__FORCED__VALUE_bw 1
 
 // reg - fluxproof::board_flags
-#define FLUXPROOF__BOARD_FLAGS__VALUE_bm 0x7
+#define FLUXPROOF__BOARD_FLAGS__VALUE_bm 0x1f
 #define FLUXPROOF__BOARD_FLAGS__VALUE_bp 0
-#define FLUXPROOF__BOARD_FLAGS__VALUE_bw 3
+#define FLUXPROOF__BOARD_FLAGS__VALUE_bw 5
 
 // reg - fluxproof::board_first
-#define FLUXPROOF__BOARD_FIRST__VALUE_bm 0x7
+#define FLUXPROOF__BOARD_FIRST__VALUE_bm 0x1f
 #define FLUXPROOF__BOARD_FIRST__VALUE_bp 0
-#define FLUXPROOF__BOARD_FIRST__VALUE_bw 3
+#define FLUXPROOF__BOARD_FIRST__VALUE_bw 5
 
 // reg - fluxproof::snap_ready
 #define FLUXPROOF__SNAP_READY__VALUE_bm 0x1
@@ -1038,6 +1068,12 @@ extern "C" {
 #define FLUXPROOF__BRIDGE_MAX__VALUE_bp 0
 #define FLUXPROOF__BRIDGE_MAX__VALUE_bw 8
 #define FLUXPROOF__BRIDGE_MAX__VALUE_reset 0x0
+
+// reg - fluxproof::index_once
+#define FLUXPROOF__INDEX_ONCE__VALUE_bm 0x1
+#define FLUXPROOF__INDEX_ONCE__VALUE_bp 0
+#define FLUXPROOF__INDEX_ONCE__VALUE_bw 1
+#define FLUXPROOF__INDEX_ONCE__VALUE_reset 0x0
 
 // reg - fluxproof::clock_ratio
 #define FLUXPROOF__CLOCK_RATIO__VALUE_bm 0x1f
@@ -1354,7 +1390,12 @@ typedef struct {
     uint32_t heartbeat;
     uint32_t brake_on;
     uint32_t brake_off;
-    uint8_t RESERVED_228_23f[0x18];
+    uint32_t emf_min;
+    uint32_t emf_i;
+    uint32_t emf_w;
+    uint32_t emf_samples;
+    uint32_t emf_l;
+    uint8_t RESERVED_23c_23f[0x4];
     uint32_t double_update;
     uint8_t RESERVED_244_3ff[0x1bc];
     uint32_t encoder;
@@ -1412,7 +1453,8 @@ typedef struct {
     uint32_t two_errors;
     uint32_t position_delay;
     uint32_t bridge_max;
-    uint8_t RESERVED_558_55f[0x8];
+    uint32_t index_once;
+    uint8_t RESERVED_55c_55f[0x4];
     uint32_t clock_ratio;
     uint32_t spi_bits;
     uint32_t spi_skip;

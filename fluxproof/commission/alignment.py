@@ -30,7 +30,7 @@ FASTEST = 1.0 / 60.0  # of the sampling frequency
 STIFF = 2.0  # kp*I over the dead time's voltage
 RAMP_S, FIELD_HZ, LEAST_S = 0.4, 6.0, 0.8  # the field's electrical frequency, at least so long a turn
 ATTEMPTS, SOFTER, SLOWER = 3, 0.4, 0.6  # where the rotor swings: kp and speed of the next attempt
-SAMPLES, INDEX_TURNS = 600, 1.15  # a way; turned to find an index
+SAMPLES, INDEX_TURNS = 600, 0.15  # a way; turned to find an index, beside a turn for each pass
 MOVED = 0.02  # of a turn: less is a locked rotor
 SLOPE = 0.05  # largest error of the slope
 LAG_DEG, RIPPLE_DEG = 40.0, 15.0  # electrical, largest
@@ -120,12 +120,17 @@ def gains(s: Session) -> tuple[float, float]:
 
 
 def _find_index(s: Session, speed: float) -> None:
-    """A little more than a turn of the shaft, after which an incremental encoder must have passed its index."""
+    """Turns of the shaft until the encoder has found its index and met it again, as many as that takes at most."""
     s.progress("alignment, looking for the index")
     s.force(0.0, speed)
-    seen = s.look(40, INDEX_TURNS * TURN_RAD * s.drive.machine.pole_pairs / speed / 40)
+    turns, looks = s.drive.encoder.index_passes + INDEX_TURNS, 40 * s.drive.encoder.index_passes
+    pause = turns * TURN_RAD * s.drive.machine.pole_pairs / speed / looks
+    seen = s.look(looks, pause, until=lambda _: bool(s.bus.read("encoder_flags") & 1))
     if not s.bus.read("encoder_flags") & 1 and float(np.ptp(seen.code)) > 0.9:
-        raise Refusal("no index within a turn of the shaft, expected one; check the line Z and [encoder] index_phase")
+        raise Refusal(
+            "no index within a turn of the shaft, or not again at the same place, expected one a turn; check the line "
+            "Z and [encoder] index_phase"
+        )
 
 
 def judge(s: Session, ways: list[Seen], reverse_given: bool | None) -> Step:

@@ -102,15 +102,17 @@ class SimulatedBus:
             period_s=drive.sample_time_s,
             u_dc=float(drive.inverter.dc_bus_v if board.u_dc is None else board.u_dc),
             has_index=board.has_index,
+            passes=drive.encoder.index_passes,
         )
         self._memory = Memory(
             plant=initial_state(board.machine, params, theta_m=board.theta_m),
             flags=np.zeros(3, np.int64),
             forced=np.zeros(LAST_ANGLE + 1, np.int64),
-            counting=np.array([drive.encoder.kind != "abz", -1, 0], np.int64),
+            counting=np.array([drive.encoder.kind != "abz", -1, 0, 0], np.int64),
             edges=edges_of(drive),
             codes=np.zeros(len(CODES), np.int64),
             observed=np.zeros(len(FIELDS), np.int64),
+            held=np.zeros(2),
             peak=np.zeros(1),
         )
         self._state, self._random = fluxproof.State(), np.random.default_rng(board.seed)
@@ -128,6 +130,10 @@ class SimulatedBus:
     @property
     def true_theta_m(self) -> float:
         return float(self._memory.plant[L.THETA_M])
+
+    def lose_encoder(self) -> None:
+        """From now on the encoder stands where it is, whatever the shaft does."""
+        self._memory.held[:] = 1.0, self.true_theta_m
 
     def read(self, name: str) -> int:
         now = self._memory

@@ -14,14 +14,15 @@ from fluxproof.plant import layout as L
 from fluxproof.plant.sensors import current_code, position_code, u_dc_code
 from golden_model import fluxproof
 from golden_model.encoders import forced_position
-from golden_model.io.fault_latch import NAMES
+from golden_model.io.fault_latch import NAMES, TRIP
 from golden_model.kernel import kernel
 from golden_model.units import TURN_RAD
 
 PLACES = 1 << forced_position.PLACE_W
 SHIFT, PLACE_W = forced_position.SHIFT, forced_position.PLACE_W
 SOURCE, ANGLE, RATE, TRAVELLED, LAST_SOURCE, LAST_ANGLE = range(6)  # of ``forced``
-REFERENCED, ZERO, LAST_CODE = range(3)  # of ``counting``: been at the index; true code at power-up, of the last sample
+# Of ``counting``: the index is believed; true code at power-up, of the last sample; passes of the index so far
+REFERENCED, ZERO, LAST_CODE, PASSES = range(4)
 INPUTS = ("omega_ref", "i_d_ref", "i_q_ext", "speed_mode", "temp_winding", "temp_valid")
 FIELDS = fluxproof.Observed._fields
 # (place in Observed, bit of the fault flags) of what a sample can trip by
@@ -31,6 +32,7 @@ FAULTS += [
     for field, name in (
         ("motion_faults", "overspeed"),
         ("open_load", "open_load"),
+        ("encoder_lost", "encoder_lost"),
         ("current_offset", "current_offset"),
     )
     if field in FIELDS
@@ -52,6 +54,7 @@ class Around(NamedTuple):
     period_s: float  # s
     u_dc: float  # V
     has_index: bool
+    passes: int  # of the index until it is believed
 
 
 class Memory(NamedTuple):
@@ -60,18 +63,19 @@ class Memory(NamedTuple):
     plant: np.ndarray  # as plant/layout.py
     flags: np.ndarray  # (3,) enable, tripped, latched faults
     forced: np.ndarray  # (6,) SOURCE to LAST_ANGLE
-    counting: np.ndarray  # (3,) REFERENCED, ZERO, LAST_CODE
+    counting: np.ndarray  # (4,) REFERENCED to PASSES
     edges: np.ndarray  # as simulated_edges
     codes: np.ndarray  # (6,) CODES of the last sample
     observed: np.ndarray  # (len(FIELDS),) its values
+    held: np.ndarray  # (2,) 1: the encoder does not move any more; mechanical rad at which it stands
     peak: np.ndarray  # (1,) A, the largest phase current so far
 
 
 @kernel
-def counted(counting, code, turn, has_index):
+def counted(counting, code, turn, has_index, passes):
     """(the code of an encoder that counts from where it was powered up until its index, 1 where it finds the index).
 
-    ``turn``: codes of a turn.
+    ``turn``: codes of a turn; ``passes`` of the index until it is believed.
     """
     if counting[REFERENCED] == 1:
         return code, 0
@@ -80,8 +84,10 @@ def counted(counting, code, turn, has_index):
     found = abs(code - counting[LAST_CODE]) > turn >> 1
     counting[LAST_CODE] = code
     if found and has_index:
-        counting[REFERENCED] = 1
-        return code, 1
+        counting[PASSES] += 1
+        if counting[PASSES] >= passes:
+            counting[REFERENCED] = 1
+            return code, 1
     return (code - counting[ZERO]) % turn, 0
 
 
@@ -101,14 +107,16 @@ def forced_code(forced, code, found, position_bits):
 def encoder(around, memory, usual, k):
     """(code, 1 where the count finds its index, omega_given) of the encoder at sample ``k``."""
     a, plant, edges, bits = around, memory.plant, memory.edges, around.config.position_bits
-    code, omega = position_code(a.sensors, plant[L.THETA_M], k), usual.omega_given
-    turns = (a.sensors.direction * plant[L.THETA_M] + a.sensors.position_offset) / TURN_RAD
+    lost = memory.held[0] == 1.0
+    theta_m, omega_m = (memory.held[1], 0.0) if lost else (plant[L.THETA_M], plant[L.OMEGA_M])
+    code, omega = position_code(a.sensors, theta_m, k), usual.omega_given
+    turns = (a.sensors.direction * theta_m + a.sensors.position_offset) / TURN_RAD
     if edges[COUNTS] > 0.0:
-        turns_per_s = a.sensors.direction * plant[L.OMEGA_M] / TURN_RAD
+        turns_per_s = a.sensors.direction * omega_m / TURN_RAD
         omega = (-1 if usual.reverse else 1) * edge_speed(edges, turns, turns_per_s, k * a.period_s)
     if edges[HALL] > 0.0:
         code = hall_code(a.params.machine.pole_pairs, turns, bits)
-    code, found = counted(memory.counting, code, 1 << bits, a.has_index)
+    code, found = counted(memory.counting, code, 1 << bits, a.has_index, a.passes)
     return code, found, omega
 
 
@@ -176,14 +184,18 @@ def advance(state, inputs, usual, around, memory, first, periods):
         duties[0] = state.compare_a / config.carrier_half
         duties[1] = state.compare_b / config.carrier_half
         duties[2] = state.compare_c / config.carrier_half
+        emf_samples = usual.emf_samples if m.forced[SOURCE] == 0 else 0
         of_speed = fluxproof.Given(
             speed_given=1 if usual.speed_given == 1 and m.forced[SOURCE] == 0 else 0,
             omega_given=omega,
             position_restart=1 if jumped else usual.position_restart,
+            emf_samples=emf_samples,
         )
         state, seen = fluxproof.step_given(state, sample, usual, config, of_speed)
         for n, value in enumerate(seen):
             m.observed[n] = value
+        if m.flags[0] == 1 and m.forced[SOURCE] == 0 and m.counting[REFERENCED] == 0:
+            m.flags[1], m.flags[2] = 1, m.flags[2] | 1 << TRIP  # no_index of board_faults
         if m.flags[0] == 1:
             latch_faults(m.flags, m.observed, usual.fault_ignore)
         times, words = centred_gates(duties, a.dead_time_s, a.period_s)

@@ -60,10 +60,14 @@ class Wires(NamedTuple):
     index_wrong: int = 0
     position_lost: int = 0
     converter_over: int = 0
+    angle_unknown: int = 0
+    hall_wrong: int = 0
+    forced: int = 0
     position_code: int = 0
     position_restart: int = 0
     speed_now: int = 0
     board_stop: int = 0
+    core_clear: int = 0
     running: int = 0
     tripped: int = 0
     fault_flags: int = 0
@@ -139,9 +143,9 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
         b.forced_angle, b.forced_rate, position_bits,
     )  # fmt: skip
     join, (sample_valid,) = join_step(state.of_join, w.trigger, w.codes_done, w.position_done)
-    faults, (board_flags, board_first, board_stop) = faults_step(
-        state.of_faults, w.index_wrong, w.position_lost, w.converter_over, inputs.enable, inputs.clear_trip,
-        b.board_ignore,
+    faults, (board_flags, board_first, board_stop, core_clear) = faults_step(
+        state.of_faults, w.index_wrong, w.position_lost, w.converter_over, w.angle_unknown, w.hall_wrong, w.forced,
+        inputs.enable, inputs.clear_trip, b.board_ignore,
     )  # fmt: skip
     snapshot, seen_snapshot = snapshot_step(
         state.of_snapshot, w.sample_valid, b.take_snapshot, w.encoder_code, w.position_code, w.encoder_count,
@@ -150,8 +154,9 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
     i = inputs
     now = clocked.Inputs(
         sample_valid=w.sample_valid, enable=i.enable, trip=1 if w.board_stop or state.trip_2 else 0,
-        clear_trip=i.clear_trip, host_write=i.host_write, sample_faults=i.sample_faults, sample_trip=i.sample_trip,
+        clear_trip=w.core_clear, host_write=i.host_write, sample_faults=i.sample_faults, sample_trip=i.sample_trip,
         current_offset=i.current_offset, motion_faults=i.motion_faults, open_load=i.open_load,
+        encoder_lost=i.encoder_lost,
         brake_asked=i.brake_asked, compare_a=i.compare_a, compare_b=i.compare_b, compare_c=i.compare_c,
     )  # fmt: skip
     core, entered, seen_core = clocked.step(state.of_core, now, regs, carrier_half)
@@ -178,10 +183,14 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
         index_wrong=x.index_wrong,
         position_lost=x.position_lost,
         converter_over=y.converter_over,
+        angle_unknown=x.angle_unknown,
+        hall_wrong=x.hall_wrong,
+        forced=forced,
         position_code=position_code,
         position_restart=position_restart,
         speed_now=speed_now,
         board_stop=board_stop,
+        core_clear=core_clear,
         running=z.running,
         tripped=z.tripped,
         fault_flags=z.fault_flags,
@@ -356,6 +365,7 @@ class BoardClock:
             omega_given=w.omega_now,
             speed_given=w.speed_now,
             position_restart=1 if values["position_restart"] or w.position_restart else 0,
+            emf_samples=0 if w.forced else values["emf_samples"],
         )
         self.of_samples, observed = fluxproof.step(self.of_samples, sample, registers, self.blocks.core)
         self.observed = observed

@@ -33,6 +33,7 @@ class State(NamedTuple):
     seen: int = 0
     valid: int = 0
     illegal: int = 0  # 1: the code before was illegal, which counts once
+    skipped: int = 0
     step_up: int = 0
     step_down: int = 0
     illegal_count: int = 0
@@ -77,6 +78,7 @@ def step(
         1 if s.seen or legal else 0,
         1 if legal else 0,
         illegal,
+        skipped,
         step_up,
         step_down,
         min(illegals + (1 if illegal and not s.illegal else 0), EVENTS_MAX),
@@ -98,6 +100,7 @@ def step(
         f.start_valid,
         f.illegal_count,
         f.skipped_count,
+        f.skipped,
     )
 
 
@@ -168,6 +171,7 @@ BLOCK = Block(
         Port("start_valid", BIT, doc="1: start_count is that of a legal code"),
         Port("illegal_count", EVENTS, doc="illegal codes entered, saturates"),
         Port("skipped_count", EVENTS, doc="changes by more than one sector, saturates"),
+        Port("skipped", BIT, doc="1: such a change"),
     ),
     state=State(),
     latency=1,

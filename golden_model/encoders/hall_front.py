@@ -43,7 +43,8 @@ def step(state, inputs, regs, position_bits):
     filter_c, (_, _) = filter_step(s.of_filter_c, x.hall_c, r.filter_clocks)
     settled = 1 if s.of_filter_a.settled and s.of_filter_b.settled and s.of_filter_c.settled else 0
     decoder, (
-        theta_hall, _, hall_valid, step_up, step_down, start_count, start_valid, illegal_count, skipped_count
+        theta_hall, _, hall_valid, step_up, step_down, start_count, start_valid, illegal_count, skipped_count,
+        skipped,
     ) = hall_step(
         s.of_decoder, s.of_filter_a.level, s.of_filter_b.level, s.of_filter_c.level, settled, x.clear_encoder,
         r.hall_reverse, r.hall_offset, r.start_first, r.sector_counts,
@@ -54,7 +55,7 @@ def step(state, inputs, regs, position_bits):
     code = s.theta_hall >> (TURN_W - position_bits) if x.sample_trigger else s.code
     following = State(filter_a, filter_b, filter_c, decoder, timer, code, theta_hall, step_up, step_down)
     return following, (
-        code, omega_me, omega_valid, hall_valid, start_count, start_valid, illegal_count, skipped_count,
+        code, omega_me, omega_valid, hall_valid, start_count, start_valid, illegal_count, skipped_count, skipped,
     )  # fmt: skip
 
 
@@ -125,7 +126,7 @@ BLOCK = Block(
     registers=ALL_REGISTERS,
     outputs=(Port("code_theta", Format(0, 0, 16), doc="angle of the sector, latched by the trigger"),)
     + tuple(_PORTS[n] for n in ("omega_me", "omega_valid", "hall_valid", "start_count", "start_valid"))
-    + tuple(_PORTS[n] for n in ("illegal_count", "skipped_count")),
+    + tuple(_PORTS[n] for n in ("illegal_count", "skipped_count", "skipped")),
     state=State(),
     latency=1,
     clocked=True,

@@ -82,6 +82,7 @@ def step(state, inputs, regs, position_bits):
         x.clear_faults,
         r.counts,
         r.correct_max,
+        r.index_once,
     )
     timer, (omega_me, omega_valid) = timer_step(
         s.of_timer, s.step_up, s.step_down, x.sample, r.reverse, r.k_edge, TIME_W, MOVED_W
@@ -125,7 +126,7 @@ def stimuli(rng, config):
     """Turns in both directions with an index, bounce on every edge, a lost line, a start, samples all the while."""
     rows = []
     counts = 60
-    regs = {"filter_clocks": 2, "index_phase": 1, "correct_max": 9, "reverse": 0, "k_edge": 900 << 12}
+    regs = {"filter_clocks": 2, "index_phase": 1, "correct_max": 9, "index_once": 0, "reverse": 0, "k_edge": 900 << 12}
     regs |= turn_counter.setting(counts, config["POSITION_BITS"])
     still = {p.name: 0 for p in BLOCK.inputs} | regs
 
@@ -153,6 +154,7 @@ def patient_stimuli(rng, config):
     """Back and forth over the index while the shaft slips: losses of every size, at correct_max or far from it."""
     rows, slip = [], 0
     still = {p.name: 0 for p in BLOCK.inputs} | {"filter_clocks": 1, "index_phase": 1, "k_edge": 900 << 16}
+    still["index_once"] = 1
     for turn in range(160):
         if turn % 40 == 0:
             counts = int(rng.integers(1000, 6000))
@@ -216,6 +218,7 @@ REGISTERS = tuple(
         "code_step",
         "code_rest",
         "correct_max",
+        "index_once",
         "reverse",
         "k_edge",
     )

@@ -8,6 +8,8 @@ speed is that between edges where there are edges, else ``omega_set``, the regis
 moved to the first index or to a start since the trigger before, so this code has nothing to do with the last one.
 Encoder 3: the count starts from the Hall sensors when they are valid and the settings are good, once, and again after
 ``clear_encoder``; the first index refers it.
+``angle_unknown``: A/B/Z before the index is believed, unless started.  ``hall_wrong``: where the angle is that of Hall
+sensors, an illegal code or a change by more than one sector.
 ``encoder_flags``: bit 0 referenced, 1 moving, 2 index_lost, 3 index_wrong, 4 setting_refused, 5 hall_valid,
 6 position_valid, 7 position_lost, 8 alarm, 9 warning, 10 forward.
 Formats: those of the blocks.
@@ -46,6 +48,11 @@ class State(NamedTuple):
     refused: int = 0
     start_count: int = 0
     start_valid: int = 0
+    referenced: int = 0
+    hall_valid: int = 0
+    skipped: int = 0
+    angle_unknown: int = 0
+    hall_wrong: int = 0
 
 
 @kernel
@@ -57,11 +64,14 @@ def step(state, inputs, regs, encoder, position_bits):
     code, omega, done, count, moving, refused = s.code, x.omega_set, 0, 0, 0, 0
     forward, referenced, index_count, illegals, lost, index_lost, index_wrong = 0, 0, 0, 0, 0, 0, 0
     hall_code, hall_omega, hall_done, hall_valid, start_count, start_valid, hall_illegals = 0, 0, 0, 0, 0, 0, 0
+    skipped = 0
     serial_clock, data_out, data_drive, position_valid, position_lost, bridged, alarm, warning = 1, 0, 0, 0, 0, 0, 0, 0
     start = 1 if s.start_valid and not s.refused and not s.started else 0
 
     if encoder == HALL or encoder == HALL_ABZ:
-        hall, (hall_code, hall_omega, hall_done, hall_valid, start_count, start_valid, hall_illegals, _) = hall_step(
+        hall, (
+            hall_code, hall_omega, hall_done, hall_valid, start_count, start_valid, hall_illegals, _, skipped
+        ) = hall_step(
             s.of_hall,
             x,
             hall_front.Registers(
@@ -82,7 +92,8 @@ def step(state, inputs, regs, encoder, position_bits):
             ),
             incremental_encoder.Registers(
                 filter_clocks=r.filter_clocks, index_phase=r.index_phase, counts=r.counts, code_step=r.code_step,
-                code_rest=r.code_rest, correct_max=r.correct_max, reverse=x.reverse, k_edge=r.k_edge,
+                code_rest=r.code_rest, correct_max=r.correct_max, index_once=r.index_once, reverse=x.reverse,
+                k_edge=r.k_edge,
             ),
             position_bits,
         )  # fmt: skip
@@ -95,20 +106,31 @@ def step(state, inputs, regs, encoder, position_bits):
         serial_clock, data_out, data_drive, code, done, position_valid, position_lost, bridged, alarm, warning = out
 
     on_the_way = 1 if s.moved or s.moving else 0
+    unknown = (encoder == ABZ or encoder == HALL_ABZ) and not (s.referenced or s.started)
+    wrong = (encoder == HALL or encoder == HALL_ABZ) and (s.skipped or not s.hall_valid) and not s.referenced
+    angle_unknown, hall_wrong = 1 if unknown else 0, 1 if wrong else 0
+    latched = s.abz_count if trigger else s.count
+    moved, restart = 0 if trigger else on_the_way, on_the_way if trigger else s.restart
+    started = 0 if s.refused or x.clear_encoder else (1 if s.started or start else 0)
     following = State(
         of_abz=abz,
         of_hall=hall,
         of_serial=serial,
         code=code,
-        count=s.abz_count if trigger else s.count,
-        moved=0 if trigger else on_the_way,
-        restart=on_the_way if trigger else s.restart,
-        started=0 if s.refused or x.clear_encoder else (1 if s.started or start else 0),
+        count=latched,
+        moved=moved,
+        restart=restart,
+        started=started,
         abz_count=count,
         moving=moving,
         refused=refused,
         start_count=start_count,
         start_valid=start_valid,
+        referenced=referenced,
+        hall_valid=hall_valid,
+        skipped=skipped,
+        angle_unknown=angle_unknown,
+        hall_wrong=hall_wrong,
     )
     flags = (
         referenced + (moving << 1) + (index_lost << 2) + (index_wrong << 3) + (refused << 4) + (hall_valid << 5)
@@ -128,6 +150,8 @@ def step(state, inputs, regs, encoder, position_bits):
         bridged_count=bridged,
         index_wrong=index_wrong,
         position_lost=position_lost,
+        angle_unknown=f.angle_unknown,
+        hall_wrong=f.hall_wrong,
         serial_clock=serial_clock,
         serial_out=data_out,
         serial_drive=data_drive,
@@ -187,7 +211,16 @@ INPUTS = (
     _PORTS["reverse"],
 )
 Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
-_INCREMENTAL = ("filter_clocks", "index_phase", "counts", "code_step", "code_rest", "correct_max", "k_edge")
+_INCREMENTAL = (
+    "filter_clocks",
+    "index_phase",
+    "counts",
+    "code_step",
+    "code_rest",
+    "correct_max",
+    "index_once",
+    "k_edge",
+)
 _HALL = ("hall_reverse", "hall_offset", "start_first", "sector_counts")
 REGISTERS = (*(_PORTS[n] for n in (*_INCREMENTAL, *_HALL)), *serial_encoder.REGISTERS)
 Registers = namedtuple("Registers", [p.name for p in REGISTERS])
@@ -204,6 +237,8 @@ OUTPUTS = (
     Port("bridged_count", EVENTS, doc="samples without a good frame, saturates"),
     _PORTS["index_wrong"],
     _PORTS["position_lost"],
+    Port("angle_unknown", BIT, doc="1: the index has not been believed, and no start given"),
+    Port("hall_wrong", BIT, doc="1: an illegal code of the Hall sensors, or more than one sector at once"),
     Port("serial_clock", BIT, doc="clock line of a serial encoder, idle 1"),
     Port("serial_out", BIT, doc="its data line as driven"),
     Port("serial_drive", BIT, doc="1: drive its data line"),

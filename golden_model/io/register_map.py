@@ -107,8 +107,9 @@ _SETTINGS = """
     1f0 i_trip        1f4 sum_trip       1f8 u_dc_min     1fc u_dc_max
     200 omega_trip    204 omega_away     208 runaway_samples               20c omega_stall  210 stall_samples
     214 i_open        218 offset_max     21c heartbeat    220 brake_on     224 brake_off
+    228 emf_min       22c emf_i          230 emf_w        234 emf_samples    238 emf_l
     240 double_update
-"""  # 228 to 23c and 244 to 3fc are free
+"""  # 23c and 244 to 3fc are free
 _COMMANDS = {
     "enable": (0x040, Kind.COMMAND),
     "clear_trip": (0x044, Kind.PULSE),

@@ -30,7 +30,7 @@ from golden_model.kernel import kernel
 JUMP = Format(0, -1, 13)
 SAMPLES = Format(0, 4, 0)
 CHECKS = Format(0, 6, 0)
-IGNORE = Format(0, 15, 0)  # the faults of fault_latch
+IGNORE = Format(0, 16, 0)  # the faults of fault_latch
 DROP_LIMIT = PU.frac_bits - LIMIT.frac_bits
 DROP_JUMP = TURN_W - JUMP.frac_bits
 WARM = 2  # samples before the next code can be extrapolated

@@ -33,7 +33,8 @@ entity hall_decoder is
     start_count   : out unsigned(17 downto 0);
     start_valid   : out std_logic;
     illegal_count : out unsigned(11 downto 0);
-    skipped_count : out unsigned(11 downto 0)
+    skipped_count : out unsigned(11 downto 0);
+    skipped       : out std_logic
   );
 end entity hall_decoder;
 
@@ -46,6 +47,7 @@ architecture rtl of hall_decoder is
     sector        : unsigned(2 downto 0);
     seen          : std_logic;
     valid         : std_logic;
+    skipped       : std_logic;
     illegal       : std_logic;  -- 1: the code before was illegal, which counts once
     illegal_count : unsigned(11 downto 0);
     skipped_count : unsigned(11 downto 0);
@@ -64,7 +66,7 @@ architecture rtl of hall_decoder is
   signal change   : signed(3 downto 0);
   signal up       : std_logic;
   signal down     : std_logic;
-  signal skipped  : std_logic;
+  signal skip     : std_logic;
 
   -- One more event, from 0 if cleared; saturates
   function counted (count : unsigned; event : std_logic; clear : std_logic) return unsigned is
@@ -87,7 +89,7 @@ begin
   change   <= signed('0' & sector_0) - signed('0' & state.sector) when state.seen = '1' else "0000";
   up       <= '1' when change = 1 or change = -5 else '0';
   down     <= '1' when change = -1 or change = 5 else '0';
-  skipped  <= '0' when change = 0 else not (up or down);
+  skip     <= '0' when change = 0 else not (up or down);
 
   process (clk)
   begin
@@ -96,8 +98,9 @@ begin
       state.seen          <= state.seen or legal;
       state.valid         <= legal;
       state.illegal       <= illegal;
+      state.skipped       <= skip;
       state.illegal_count <= counted(state.illegal_count, illegal and not state.illegal, clear_faults);
-      state.skipped_count <= counted(state.skipped_count, skipped, clear_faults);
+      state.skipped_count <= counted(state.skipped_count, skip, clear_faults);
       step_up             <= up;
       step_down           <= down;
       theta_hall          <= HALL_DECODER_MIDDLE(to_integer(sector_0)) + hall_offset;
@@ -113,6 +116,7 @@ begin
         state.seen          <= '0';
         state.valid         <= '0';
         state.illegal       <= '0';
+        state.skipped       <= '0';
         state.illegal_count <= (others => '0');
         state.skipped_count <= (others => '0');
         step_up             <= '0';
@@ -130,5 +134,6 @@ begin
   hall_valid    <= state.valid;
   illegal_count <= state.illegal_count;
   skipped_count <= state.skipped_count;
+  skipped       <= state.skipped;
 
 end architecture rtl;

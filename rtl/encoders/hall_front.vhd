@@ -36,7 +36,8 @@ entity hall_front is
     start_count    : out unsigned(17 downto 0);
     start_valid    : out std_logic;
     illegal_count  : out unsigned(11 downto 0);
-    skipped_count  : out unsigned(11 downto 0)
+    skipped_count  : out unsigned(11 downto 0);
+    skipped        : out std_logic
   );
 end entity hall_front;
 
@@ -64,7 +65,7 @@ begin
               sector_counts => sector_counts,
               theta_hall => theta_hall, sector => open, hall_valid => hall_valid, step_up => step_up,
               step_down => step_down, start_count => start_count, start_valid => start_valid,
-              illegal_count => illegal_count, skipped_count => skipped_count);
+              illegal_count => illegal_count, skipped_count => skipped_count, skipped => skipped);
 
   timer : entity work.edge_timer
     port map (clk => clk, rst => rst, step_up => step_up, step_down => step_down, sample => sample_trigger,

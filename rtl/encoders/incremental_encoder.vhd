@@ -29,6 +29,7 @@ entity incremental_encoder is
     code_step       : in  unsigned(16 downto 0);
     code_rest       : in  unsigned(17 downto 0);
     correct_max     : in  unsigned(11 downto 0);
+    index_once      : in  std_logic;
     reverse         : in  std_logic;
     k_edge          : in  unsigned(31 downto 0);
     code_theta      : out unsigned(POSITION_BITS - 1 downto 0);
@@ -136,6 +137,7 @@ begin
       clear_faults => clear_faults,
       counts       => counts,
       correct_max  => correct_max,
+      index_once   => index_once,
       correct      => correct,
       correction   => correction,
       fast         => fast,

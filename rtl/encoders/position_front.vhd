@@ -5,6 +5,8 @@
 -- between edges, else omega_set.  encoder_restart: the count has moved to the first index or to a start since the
 -- trigger before.  ENCODER 3: the count starts from the Hall sensors when they are valid and the settings are good,
 -- once, and again after clear_encoder.
+-- angle_unknown: A/B/Z before the index is believed, unless started.  hall_wrong: where the angle is that of Hall sensors,
+-- an illegal code or a change by more than one sector.
 -- encoder_flags: 0 referenced, 1 moving, 2 index_lost, 3 index_wrong, 4 setting_refused, 5 hall_valid,
 -- 6 position_valid, 7 position_lost, 8 alarm, 9 warning, 10 forward.
 -- Formats: those of the blocks.  Latency: 1 (every clock is a sample).  Rounding: none.
@@ -41,6 +43,7 @@ entity position_front is
     code_step       : in  unsigned(16 downto 0);
     code_rest       : in  unsigned(17 downto 0);
     correct_max     : in  unsigned(11 downto 0);
+    index_once      : in  std_logic;
     k_edge          : in  unsigned(31 downto 0);
     hall_reverse    : in  std_logic;
     hall_offset     : in  unsigned(TURN_W - 1 downto 0);
@@ -69,6 +72,8 @@ entity position_front is
     bridged_count   : out unsigned(11 downto 0);
     index_wrong     : out std_logic;
     position_lost   : out std_logic;
+    angle_unknown   : out std_logic;
+    hall_wrong      : out std_logic;
     serial_clock    : out std_logic;
     serial_out      : out std_logic;
     serial_drive    : out std_logic
@@ -82,7 +87,7 @@ architecture rtl of position_front is
   signal count, start_count                          : unsigned(17 downto 0);
   signal referenced, moving, index_lost, refused     : std_logic;
   signal forward, hall_done, hall_valid, start_valid : std_logic;
-  signal position_valid, alarm, warning              : std_logic;
+  signal position_valid, alarm, warning, skipped     : std_logic;
   signal hall_code, code_held                        : unsigned(POSITION_BITS - 1 downto 0);
   signal hall_omega, omega_held                      : signed(PU_W - 1 downto 0);
   signal hall_illegals                               : unsigned(11 downto 0);
@@ -103,7 +108,8 @@ begin
       port map (clk => clk, rst => rst, pin_a => pin_a, pin_b => pin_b, pin_z => pin_z, sample => sample_trigger,
                 start => start, start_count => start_count, clear_faults => clear_encoder,
                 filter_clocks => filter_clocks, index_phase => index_phase, counts => counts, code_step => code_step,
-                code_rest => code_rest, correct_max => correct_max, reverse => reverse, k_edge => k_edge,
+                code_rest => code_rest, correct_max => correct_max, index_once => index_once, reverse => reverse,
+                k_edge => k_edge,
                 code_theta => encoder_code, omega_me => omega_now, omega_valid => position_done, count => count,
                 forward => forward, referenced => referenced, moving => moving, index_count => index_count,
                 illegal_count => illegal_count, lost_counts => lost_counts, index_lost => index_lost,
@@ -126,12 +132,13 @@ begin
                 hall_reverse => hall_reverse, hall_offset => hall_offset, start_first => start_first,
                 sector_counts => sector_counts, reverse => reverse, k_edge => k_edge, code_theta => hall_code,
                 omega_me => hall_omega, omega_valid => hall_done, hall_valid => hall_valid, start_count => start_count,
-                start_valid => start_valid, illegal_count => hall_illegals, skipped_count => open);
+                start_valid => start_valid, illegal_count => hall_illegals, skipped_count => open, skipped => skipped);
 
   else generate
     start_count <= (others => '0');
     start_valid <= '0';
     hall_valid  <= '0';
+    skipped     <= '0';
   end generate sectors;
 
   hall_alone : if ENCODER = 2 generate
@@ -186,6 +193,10 @@ begin
         moved           <= '0';
       end if;
 
+      -- Whether the angle can be trusted
+      angle_unknown <= not (referenced or started) when ABZ else '0';
+      hall_wrong    <= (skipped or not hall_valid) and not referenced when HALL else '0';
+
       if rst = '1' then
         omega_held      <= (others => '0');
         triggered       <= '0';
@@ -194,6 +205,8 @@ begin
         encoder_restart <= '0';
         moved           <= '0';
         started         <= '0';
+        angle_unknown   <= '0';
+        hall_wrong      <= '0';
       end if;
     end if;
   end process;

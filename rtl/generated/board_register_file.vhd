@@ -71,7 +71,7 @@ entity board_register_file is
     position_source   : out std_logic;  -- 418 0: encoder, 1: forced_angle
     forced_angle      : out unsigned(17 downto 0);  -- 41c angle of the shaft that replaces the encoder's
     forced_rate       : out signed(25 downto 0);  -- 420 what it turns by, turns a sample
-    board_ignore      : out unsigned(2 downto 0);  -- 424 bit x: fault x of the board is reported and does not trip
+    board_ignore      : out unsigned(4 downto 0);  -- 424 bit x: fault x of the board is reported and does not trip
     filter_clocks     : out unsigned(9 downto 0);  -- 500 longest pulse without effect, clocks
     index_phase       : out unsigned(1 downto 0);  -- 504 phase of A and B in which Z marks the index
     counts            : out unsigned(18 downto 0);  -- 508 counts a turn, four for each line
@@ -94,6 +94,7 @@ entity board_register_file is
     two_errors        : out std_logic;  -- 54c 1: the frame has error 2
     position_delay    : out unsigned(17 downto 0);  -- 550 time from the encoder's latch to the currents', samples
     bridge_max        : out unsigned(7 downto 0);  -- 554 samples that may be bridged one after the other
+    index_once        : out std_logic;  -- 558 1: the first index is believed, 0: the second at the same place
     clock_ratio       : out unsigned(4 downto 0);  -- 560 clocks of a period of sclk, 4 to 16
     spi_bits          : out unsigned(5 downto 0);  -- 564 bits of a word, 12 to 32
     spi_skip          : out unsigned(4 downto 0);  -- 568 bits of a word before the code
@@ -131,8 +132,8 @@ entity board_register_file is
     double_used       : in  std_logic;  -- 080 double_update in force
     min_pulse_used    : in  unsigned(11 downto 0);  -- 088 minimum pulse in force
     telemetry_dropped : in  unsigned(15 downto 0);  -- 0c8 samples without a packet, up to 65535
-    fault_flags       : in  unsigned(14 downto 0);  -- 0cc faults since the last clear_trip, see fault_latch
-    first_fault       : in  unsigned(14 downto 0);  -- 0d0 faults that tripped first
+    fault_flags       : in  unsigned(15 downto 0);  -- 0cc faults since the last clear_trip, see fault_latch
+    first_fault       : in  unsigned(15 downto 0);  -- 0d0 faults that tripped first
     early_samples     : in  unsigned(7 downto 0);  -- 0d4 samples rejected because they came too early
     irq_cause         : in  unsigned(3 downto 0);  -- 0d8 causes since they were cleared: trip, fault, setting refused, gates gone off
     encoder_flags     : in  unsigned(10 downto 0);  -- 440 flags of the encoder, see position_front
@@ -144,8 +145,8 @@ entity board_register_file is
     converter_errors  : in  unsigned(11 downto 0);  -- 458 triggers without codes, saturates
     converter_refused : in  std_logic;  -- 45c 1: the registers of the SPI converters contradict each other
     forced            : in  std_logic;  -- 460 1: the code is the host's
-    board_flags       : in  unsigned(2 downto 0);  -- 464 faults of the board since the last clear_trip, see board_faults
-    board_first       : in  unsigned(2 downto 0);  -- 468 faults of the board that tripped first
+    board_flags       : in  unsigned(4 downto 0);  -- 464 faults of the board since the last clear_trip, see board_faults
+    board_first       : in  unsigned(4 downto 0);  -- 468 faults of the board that tripped first
     snap_ready        : in  std_logic;  -- 470 1: the snapshot is there
     snap_code         : in  unsigned(17 downto 0);  -- 474 snapshot: position code of the encoder, right-aligned
     snap_position     : in  unsigned(17 downto 0);  -- 478 snapshot: position code of the sample, right-aligned
@@ -469,7 +470,7 @@ begin
         written(94)       <= '1';
       end if;
       if (row(11) and column(7) and not sample_busy) = '1' then
-        settings.fault_ignore <= unsigned(held(14 downto 0));
+        settings.fault_ignore <= unsigned(held(15 downto 0));
         written(95)           <= '1';
       end if;
       if (row(12) and column(0) and not sample_busy) = '1' then
@@ -636,6 +637,26 @@ begin
         settings.brake_off <= unsigned(held(8 downto 0));
         written(137)       <= '1';
       end if;
+      if (row(17) and column(2) and not sample_busy) = '1' then
+        settings.emf_min <= unsigned(held(16 downto 0));
+        written(138)     <= '1';
+      end if;
+      if (row(17) and column(3) and not sample_busy) = '1' then
+        settings.emf_i <= unsigned(held(22 downto 0));
+        written(139)   <= '1';
+      end if;
+      if (row(17) and column(4) and not sample_busy) = '1' then
+        settings.emf_w <= unsigned(held(23 downto 0));
+        written(140)   <= '1';
+      end if;
+      if (row(17) and column(5) and not sample_busy) = '1' then
+        settings.emf_samples <= unsigned(held(11 downto 0));
+        written(141)         <= '1';
+      end if;
+      if (row(17) and column(6) and not sample_busy) = '1' then
+        settings.emf_l <= unsigned(held(23 downto 0));
+        written(142)   <= '1';
+      end if;
       if (row(18) and column(0) and not sample_busy) = '1' then
         settings.double_update <= held(0);
         written(144)           <= '1';
@@ -659,7 +680,7 @@ begin
         written(264) <= '1';
       end if;
       if (row(33) and column(1)) = '1' then
-        board_ignore <= unsigned(held(2 downto 0));
+        board_ignore <= unsigned(held(4 downto 0));
         written(265) <= '1';
       end if;
       if (row(40) and column(0) and not sample_busy) = '1' then
@@ -749,6 +770,10 @@ begin
       if (row(42) and column(5) and not sample_busy) = '1' then
         bridge_max   <= unsigned(held(7 downto 0));
         written(341) <= '1';
+      end if;
+      if (row(42) and column(6) and not sample_busy) = '1' then
+        index_once   <= held(0);
+        written(342) <= '1';
       end if;
       if (row(43) and column(0) and not sample_busy) = '1' then
         clock_ratio  <= unsigned(held(4 downto 0));
@@ -965,6 +990,11 @@ begin
         settings.heartbeat        <= (others => '0');
         settings.brake_on         <= (others => '0');
         settings.brake_off        <= (others => '0');
+        settings.emf_min          <= (others => '0');
+        settings.emf_i            <= (others => '0');
+        settings.emf_w            <= (others => '0');
+        settings.emf_samples      <= (others => '0');
+        settings.emf_l            <= (others => '0');
         settings.double_update    <= '0';
         clear_encoder             <= '0';
         take_snapshot             <= '0';
@@ -994,6 +1024,7 @@ begin
         two_errors                <= '0';
         position_delay            <= (others => '0');
         bridge_max                <= (others => '0');
+        index_once                <= '0';
         clock_ratio               <= (others => '0');
         spi_bits                  <= (others => '0');
         spi_skip                  <= (others => '0');

@@ -94,8 +94,8 @@ architecture rtl of fluxproof_axi is
   signal tripped           : std_logic;
   signal sample_busy       : std_logic;
   signal brake_next        : std_logic;
-  signal fault_flags       : unsigned(14 downto 0);
-  signal first_fault       : unsigned(14 downto 0);
+  signal fault_flags       : unsigned(15 downto 0);
+  signal first_fault       : unsigned(15 downto 0);
   signal early_samples     : unsigned(7 downto 0);
   signal setting_refused   : std_logic;
   signal min_pulse_used    : unsigned(11 downto 0);

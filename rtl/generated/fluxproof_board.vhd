@@ -119,7 +119,7 @@ architecture rtl of fluxproof_board is
   signal position_source   : std_logic;
   signal forced_angle      : unsigned(17 downto 0);
   signal forced_rate       : signed(25 downto 0);
-  signal board_ignore      : unsigned(2 downto 0);
+  signal board_ignore      : unsigned(4 downto 0);
   signal filter_clocks     : unsigned(9 downto 0);
   signal index_phase       : unsigned(1 downto 0);
   signal counts            : unsigned(18 downto 0);
@@ -142,6 +142,7 @@ architecture rtl of fluxproof_board is
   signal two_errors        : std_logic;
   signal position_delay    : unsigned(17 downto 0);
   signal bridge_max        : unsigned(7 downto 0);
+  signal index_once        : std_logic;
   signal clock_ratio       : unsigned(4 downto 0);
   signal spi_bits          : unsigned(5 downto 0);
   signal spi_skip          : unsigned(4 downto 0);
@@ -180,8 +181,8 @@ architecture rtl of fluxproof_board is
   signal tripped           : std_logic;
   signal sample_busy       : std_logic;
   signal brake_next        : std_logic;
-  signal fault_flags       : unsigned(14 downto 0);
-  signal first_fault       : unsigned(14 downto 0);
+  signal fault_flags       : unsigned(15 downto 0);
+  signal first_fault       : unsigned(15 downto 0);
   signal early_samples     : unsigned(7 downto 0);
   signal setting_refused   : std_logic;
   signal min_pulse_used    : unsigned(11 downto 0);
@@ -204,6 +205,8 @@ architecture rtl of fluxproof_board is
   signal bridged_count     : unsigned(11 downto 0);
   signal index_wrong       : std_logic;
   signal position_lost     : std_logic;
+  signal angle_unknown     : std_logic;
+  signal hall_wrong        : std_logic;
   signal position_code     : unsigned(POSITION_BITS - 1 downto 0);
   signal position_restart  : std_logic;
   signal speed_now         : std_logic;
@@ -218,9 +221,10 @@ architecture rtl of fluxproof_board is
   signal converter_over    : std_logic;
   signal daddr_out         : unsigned(6 downto 0);
   signal sample_valid      : std_logic;
-  signal board_flags       : unsigned(2 downto 0);
-  signal board_first       : unsigned(2 downto 0);
+  signal board_flags       : unsigned(4 downto 0);
+  signal board_first       : unsigned(4 downto 0);
   signal board_stop        : std_logic;
+  signal core_clear        : std_logic;
   signal snap_ready        : std_logic;
   signal snap_code         : unsigned(TURN_W - 1 downto 0);
   signal snap_position     : unsigned(TURN_W - 1 downto 0);
@@ -257,13 +261,16 @@ begin
   sample.clear_faults  <= clear_faults_in;
 
   -- What the front ends know better than a register
-  process (settings, omega_now, speed_now, position_restart)
+  process (settings, omega_now, speed_now, position_restart, forced)
     variable given : settings_t;
   begin
     given                  := settings;
     given.omega_given      := omega_now;
     given.speed_given      := speed_now;
     given.position_restart := settings.position_restart or position_restart;
+    if forced = '1' then
+      given.emf_samples := (others => '0');
+    end if;
     core_settings          <= given;
   end process;
 
@@ -345,6 +352,7 @@ begin
       two_errors        => two_errors,
       position_delay    => position_delay,
       bridge_max        => bridge_max,
+      index_once        => index_once,
       clock_ratio       => clock_ratio,
       spi_bits          => spi_bits,
       spi_skip          => spi_skip,
@@ -423,7 +431,7 @@ begin
       settings        => core_settings,
       enable          => enable,
       trip            => core_trip,
-      clear_trip      => clear_trip,
+      clear_trip      => core_clear,
       host_write      => host_write,
       gate_high       => gate_high_next,
       gate_low        => gate_low_next,
@@ -529,6 +537,7 @@ begin
       code_step       => code_step,
       code_rest       => code_rest,
       correct_max     => correct_max,
+      index_once      => index_once,
       k_edge          => k_edge,
       hall_reverse    => hall_reverse,
       hall_offset     => hall_offset,
@@ -557,6 +566,8 @@ begin
       bridged_count   => bridged_count,
       index_wrong     => index_wrong,
       position_lost   => position_lost,
+      angle_unknown   => angle_unknown,
+      hall_wrong      => hall_wrong,
       serial_clock    => serial_clock,
       serial_out      => serial_out,
       serial_drive    => serial_drive
@@ -669,12 +680,16 @@ begin
       index_wrong    => index_wrong,
       position_lost  => position_lost,
       converter_over => converter_over,
+      angle_unknown  => angle_unknown,
+      hall_wrong     => hall_wrong,
+      forced         => forced,
       enable         => enable,
       clear_trip     => clear_trip,
       board_ignore   => board_ignore,
       board_flags    => board_flags,
       board_first    => board_first,
-      board_stop     => board_stop
+      board_stop     => board_stop,
+      core_clear     => core_clear
     );
 
   snapshot : entity work.board_snapshot

@@ -83,7 +83,7 @@ package fluxproof_pkg is
     ki_d             : unsigned(KI_W - 1 downto 0);  -- integral gain times sample time, d axis
     kp_q             : unsigned(KP_W - 1 downto 0);  -- proportional gain, q axis
     ki_q             : unsigned(KI_W - 1 downto 0);  -- integral gain times sample time, q axis
-    r_s              : unsigned(KI_W - 1 downto 0);  -- winding resistance at t_0
+    r_s              : unsigned(KI_W - 1 downto 0);  -- winding resistance
     tcr              : unsigned(23 downto 0);  -- change of r_s per kelvin
     t_0              : signed(15 downto 0);  -- temperature of r_s
     t_min            : signed(15 downto 0);  -- lowest valid temperature
@@ -121,13 +121,18 @@ package fluxproof_pkg is
     u_dc_min         : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage below which it trips
     u_dc_max         : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage that trips
     jump_max         : unsigned(11 downto 0);  -- deviation from the extrapolated position that trips, turns
-    fault_ignore     : unsigned(14 downto 0);  -- bit x: fault x of fault_flags is reported and does not trip
+    fault_ignore     : unsigned(15 downto 0);  -- bit x: fault x of fault_flags is reported and does not trip
     omega_stall      : unsigned(LIMIT_W - 1 downto 0);  -- speed below which the shaft stands
     offset_max       : unsigned(9 downto 0);  -- mean current of a phase at rest that trips: the sensor's zero is wrong
     omega_trip       : unsigned(LIMIT_W - 1 downto 0);  -- speed that trips, electrical
     omega_away       : unsigned(LIMIT_W - 1 downto 0);  -- speed against the reference from which a runaway is looked for
     runaway_samples  : unsigned(11 downto 0);  -- samples in sequence against the reference without braking that trip
     stall_samples    : unsigned(15 downto 0);  -- samples in sequence at the current limit at rest that are a stall
+    emf_min          : unsigned(DUTY_W - 1 downto 0);  -- voltage that the EMF may be wrong by at rest without current
+    emf_l            : unsigned(23 downto 0);  -- inductance over eight samples
+    emf_i            : unsigned(22 downto 0);  -- the same for each current
+    emf_w            : unsigned(23 downto 0);  -- the same for each electrical speed
+    emf_samples      : unsigned(11 downto 0);  -- samples with a wrong EMF, more than right ones, that are a lost encoder; 0: off
     i_open           : unsigned(LIMIT_W - 1 downto 0);  -- current that a connected phase reaches when twice as much is asked for
     brake_on         : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage from which the brake resistor is on; 0: none
     brake_off        : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage below which it is off
@@ -172,6 +177,7 @@ package fluxproof_pkg is
     current_offset     : std_logic;  -- 1: the zero of a current sensor is wrong
     motion_faults      : unsigned(2 downto 0);  -- overspeed, runaway, stall, see motion_checks
     open_load          : std_logic;  -- 1: a phase or the motor is not connected
+    encoder_lost       : std_logic;  -- 1: encoder and EMF contradict each other
     brake_asked        : std_logic;  -- 1: the bus asks for the brake resistor
     speed_was_given    : std_logic;  -- 1: omega_me of this sample was measured elsewhere
     position_restarted : std_logic;  -- 1: the code of this sample had nothing to do with the one before
@@ -588,11 +594,18 @@ package fluxproof_pkg is
   constant CURRENT_CONDITIONING_LATENCY : positive := 5;
   constant CURRENT_CONDITIONING_DROP : natural := 15;
 
+  -- emf_check: none: protection and diagnosis of the drive
+  constant EMF_CHECK_LATENCY : positive := 13;
+  constant EMF_CHECK_DROP : natural := 23;
+  constant EMF_CHECK_HALF_R : natural := 1;
+  constant EMF_CHECK_MEAN : natural := 3;
+
   -- fault_latch: none: protection and diagnosis of the drive
   constant FAULT_LATCH_LATENCY : positive := 1;
   constant FAULT_LATCH_LATE : natural := 6;
   constant FAULT_LATCH_TRIP : natural := 7;
   constant FAULT_LATCH_EARLY : natural := 8;
+  constant FAULT_LATCH_HELD : natural := 16;
 
   -- host_watch: none: protection of the drive
   constant HOST_WATCH_LATENCY : positive := 1;

@@ -69,8 +69,8 @@ entity register_file is
     double_used       : in  std_logic;  -- 080 double_update in force
     min_pulse_used    : in  unsigned(11 downto 0);  -- 088 minimum pulse in force
     telemetry_dropped : in  unsigned(15 downto 0);  -- 0c8 samples without a packet, up to 65535
-    fault_flags       : in  unsigned(14 downto 0);  -- 0cc faults since the last clear_trip, see fault_latch
-    first_fault       : in  unsigned(14 downto 0);  -- 0d0 faults that tripped first
+    fault_flags       : in  unsigned(15 downto 0);  -- 0cc faults since the last clear_trip, see fault_latch
+    first_fault       : in  unsigned(15 downto 0);  -- 0d0 faults that tripped first
     early_samples     : in  unsigned(7 downto 0);  -- 0d4 samples rejected because they came too early
     irq_cause         : in  unsigned(3 downto 0)  -- 0d8 causes since they were cleared: trip, fault, setting refused, gates gone off
   );
@@ -385,7 +385,7 @@ begin
         written(94)       <= '1';
       end if;
       if (row(11) and column(7) and not sample_busy) = '1' then
-        settings.fault_ignore <= unsigned(held(14 downto 0));
+        settings.fault_ignore <= unsigned(held(15 downto 0));
         written(95)           <= '1';
       end if;
       if (row(12) and column(0) and not sample_busy) = '1' then
@@ -552,6 +552,26 @@ begin
         settings.brake_off <= unsigned(held(8 downto 0));
         written(137)       <= '1';
       end if;
+      if (row(17) and column(2) and not sample_busy) = '1' then
+        settings.emf_min <= unsigned(held(16 downto 0));
+        written(138)     <= '1';
+      end if;
+      if (row(17) and column(3) and not sample_busy) = '1' then
+        settings.emf_i <= unsigned(held(22 downto 0));
+        written(139)   <= '1';
+      end if;
+      if (row(17) and column(4) and not sample_busy) = '1' then
+        settings.emf_w <= unsigned(held(23 downto 0));
+        written(140)   <= '1';
+      end if;
+      if (row(17) and column(5) and not sample_busy) = '1' then
+        settings.emf_samples <= unsigned(held(11 downto 0));
+        written(141)         <= '1';
+      end if;
+      if (row(17) and column(6) and not sample_busy) = '1' then
+        settings.emf_l <= unsigned(held(23 downto 0));
+        written(142)   <= '1';
+      end if;
       if (row(18) and column(0) and not sample_busy) = '1' then
         settings.double_update <= held(0);
         written(144)           <= '1';
@@ -647,6 +667,11 @@ begin
         settings.heartbeat        <= (others => '0');
         settings.brake_on         <= (others => '0');
         settings.brake_off        <= (others => '0');
+        settings.emf_min          <= (others => '0');
+        settings.emf_i            <= (others => '0');
+        settings.emf_w            <= (others => '0');
+        settings.emf_samples      <= (others => '0');
+        settings.emf_l            <= (others => '0');
         settings.double_update    <= '0';
       end if;
     end if;

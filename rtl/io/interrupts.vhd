@@ -19,7 +19,7 @@ entity interrupts is
     clk             : in  std_logic;
     rst             : in  std_logic;
     tripped         : in  std_logic;
-    fault_flags     : in  unsigned(14 downto 0);
+    fault_flags     : in  unsigned(15 downto 0);
     setting_refused : in  std_logic;
     running         : in  std_logic;
     irq_mask        : in  unsigned(3 downto 0);
@@ -32,7 +32,7 @@ end entity interrupts;
 architecture rtl of interrupts is
   -- State
   signal causes : unsigned(3 downto 0);
-  signal flags  : unsigned(14 downto 0);
+  signal flags  : unsigned(15 downto 0);
   signal was_on : std_logic;
 
   signal now_0    : unsigned(3 downto 0);

@@ -2,7 +2,8 @@
 -- Purpose: everything that turns the gates off: guard of the samples, checks, watch of the host, memory of the faults,
 -- and the brake chopper beside them.  This entity only instantiates.
 --
---   strobe -> guard -> checks of the sample, of the motion, of the load, of the sensors' zero -> fault latch -> gate_trip
+--   strobe -> guard -> checks of the sample, of the motion, of the load, of the sensors' zero, of the EMF -> fault latch
+--   -> gate_trip
 --
 -- A faulty sample trips without waiting for the fault latch; without enable the gates are off and nothing is latched.
 -- brake is off while samples are missing: without a reading of the bus nothing may heat the resistor.
@@ -25,6 +26,7 @@ entity protection is
     dc_valid        : in  std_logic;
     omega_valid     : in  std_logic;
     reference_valid : in  std_logic;
+    voltage_valid   : in  std_logic;
     i_a             : in  signed(PU_W - 1 downto 0);
     i_b             : in  signed(PU_W - 1 downto 0);
     i_c             : in  signed(PU_W - 1 downto 0);
@@ -38,6 +40,14 @@ entity protection is
     speed_mode      : in  std_logic;
     i_q_ref         : in  signed(PU_W - 1 downto 0);
     speed_limited   : in  std_logic;
+    u_d             : in  signed(PU_W - 1 downto 0);
+    u_q             : in  signed(PU_W - 1 downto 0);
+    u_comp_d        : in  signed(PU_W - 1 downto 0);
+    u_comp_q        : in  signed(PU_W - 1 downto 0);
+    i_d             : in  signed(PU_W - 1 downto 0);
+    i_q             : in  signed(PU_W - 1 downto 0);
+    model_d         : in  signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
+    model_q         : in  signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
     run             : in  std_logic;
     trip            : in  std_logic;
     enable          : in  std_logic;
@@ -51,10 +61,11 @@ entity protection is
     sample_trip     : out std_logic;
     motion_faults   : out unsigned(2 downto 0);
     open_load       : out std_logic;
+    encoder_lost    : out std_logic;
     current_offset  : out std_logic;
     brake_asked     : out std_logic;
-    fault_flags     : out unsigned(14 downto 0);
-    first_fault     : out unsigned(14 downto 0);
+    fault_flags     : out unsigned(15 downto 0);
+    first_fault     : out unsigned(15 downto 0);
     gate_trip       : out std_logic;
     gate_clear      : out std_logic;
     brake           : out std_logic
@@ -106,6 +117,14 @@ begin
               i_open => settings.i_open,
               out_valid => open, open_load => open_load);
 
+  emf : entity work.emf_check
+    port map (clk => clk, rst => rst, in_valid => voltage_valid,
+              u_d => u_d, u_q => u_q, u_comp_d => u_comp_d, u_comp_q => u_comp_q, i_d => i_d, i_q => i_q,
+              model_d => model_d, model_q => model_q, omega_me => omega_me, run => run,
+              r_s => settings.r_s, emf_min => settings.emf_min, emf_l => settings.emf_l, emf_i => settings.emf_i, emf_w => settings.emf_w,
+              emf_samples => settings.emf_samples,
+              out_valid => open, encoder_lost => encoder_lost);
+
   chopper : entity work.brake_chopper
     port map (clk => clk, rst => rst, in_valid => dc_valid,
               u_dc => u_dc,
@@ -122,7 +141,7 @@ begin
     port map (clk => clk, rst => rst,
               trip => trip, sample_faults => sample_faults, sample_late => sample_late, sample_early => sample_early,
               motion_faults => motion_faults, open_load => open_load, current_offset => current_offset,
-              host_lost => host_lost, enable => enable, clear_trip => clear_trip,
+              host_lost => host_lost, encoder_lost => encoder_lost, enable => enable, clear_trip => clear_trip,
               fault_ignore => settings.fault_ignore,
               fault_flags => fault_flags, first_fault => first_fault, fault_stop => fault_stop,
               gate_clear => gate_clear);

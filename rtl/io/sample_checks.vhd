@@ -40,7 +40,7 @@ entity sample_checks is
     u_dc_min         : in  unsigned(LIMIT_W - 1 downto 0);
     u_dc_max         : in  unsigned(LIMIT_W - 1 downto 0);
     jump_max         : in  unsigned(11 downto 0);
-    fault_ignore     : in  unsigned(14 downto 0);
+    fault_ignore     : in  unsigned(15 downto 0);
     position_restart : in  std_logic;
     out_valid        : out std_logic;
     sample_faults    : out unsigned(5 downto 0);

@@ -31,7 +31,14 @@ PROOFS = (
         ("STOP",),
         Fault("trip needs enable", LATCH, "now_0(k) when k = FAULT_LATCH_TRIP else now_0(k) and enable",
               "now_0(k) and enable"),
-        Fault("cleared without clear_trip", LATCH, "(now_0(k) or not clear_trip)", "now_0(k)"),
+        Fault("cleared without clear_trip", LATCH, "(now_0(k) or not clear_0)", "now_0(k)"),
+    ),
+    proof(
+        "clear",
+        "a trip beats a clear: for 16 clocks after trip has become 1 no clear_trip clears it",
+        "fault_latch",
+        ("CLEAR",),
+        Fault("cleared unseen", LATCH, "clear_trip and not caused_0 and nor held", "clear_trip"),
     ),
     proof(
         "first_fault",

@@ -45,6 +45,7 @@ def incremental(seed: int, clocks: int) -> Iterator[tuple[dict[str, int], dict[s
             "index_phase": phase,
             "correct_max": int(rng.choice([0, 8, 100])),
             "reverse": int(rng.integers(2)),
+            "index_once": int(rng.integers(4) > 0),
             "k_edge": int(rng.integers(1 << 32)),
         }
         spacing = int(rng.choice([30, 60, 500]))

@@ -112,7 +112,7 @@ def trace(state, sample, registers, config, of_speed=None) -> dict[str, tuple]:
     for name in ("for_control", "step"):
         setattr(estimators, name, _overheard(getattr(estimation, name).py_func, notes))
     r = registers
-    of_speed = of_speed or fluxproof.Given(r.speed_given, r.omega_given, r.position_restart)
+    of_speed = of_speed or fluxproof.Given(r.speed_given, r.omega_given, r.position_restart, r.emf_samples)
     step = _overheard(fluxproof.step_given.py_func, notes, estimation=estimators)
     step(state, sample, registers, config, of_speed)
     said = {}
