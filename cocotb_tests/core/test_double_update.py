@@ -45,7 +45,7 @@ def twice(tmp_path_factory):
 def test_closed_loop_in_verilator(twice):
     """5,000 half periods with every event: 0 differences, and the edges of each leg where its half's duty puts them."""
     skip_without_ghdl5()
-    summary, arrays, register_set = close_loop(InVerilator, twice, "everything", 128, key=" twice")
+    summary, arrays, register_set = close_loop(InVerilator, twice, "everything", 100, key=" twice")
     assert summary["sample_to_duty_clocks"] == fluxproof.SAMPLE_TO_DUTY
     assert summary["differences"] == 0 and summary["periods_compared"] == 5000
     assert np.count_nonzero(arrays["observed_sat_q"]) > 100

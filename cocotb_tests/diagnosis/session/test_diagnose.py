@@ -65,7 +65,7 @@ def test_a_healthy_drive_has_no_mismatch():
     assert answer.rows == len(GRID) * 800 and answer.problems == ()
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [slowly(n) if n in ("resistance", "magnet_flux", "saturation") else n for n in CASES])
 def test_an_effect_is_named_with_its_size(name):
     deviation, parameter, value, bound = CASES[name]
     answer = diagnose(recorded(**deviation), NOMINAL)
@@ -77,12 +77,14 @@ def test_an_effect_is_named_with_its_size(name):
     assert answer.fit.holdout_after < 0.5 * answer.fit.holdout_before, summary(answer)
 
 
+@pytest.mark.slow
 def test_device_drops_are_identified():
     answer = diagnose(recorded(inverter={"v_switch_v": 1.5, "v_diode_v": 1.5}), NOMINAL)
     assert answer.verdict == "explained" and [e.name for e in answer.effects] == ["dead_time"], summary(answer)
     assert answer.effects[0].parameters["v_dead_v"].value == pytest.approx(1.5, rel=0.03)
 
 
+@pytest.mark.slow
 def test_noise_floor_equals_the_noise():
     """Whatever the effect, the same converters with the same noise made the recording."""
     healthy, saturated = (diagnose(recorded(machine=m), NOMINAL).fit.noise_floor for m in (None, SATURATED))
@@ -165,6 +167,7 @@ def test_torque_ripple_amplitude_is_independent_of_speed_and_direction(order):
     assert found["cogging_nm"].value == pytest.approx(0.4, rel=0.01)
 
 
+@pytest.mark.slow
 def test_rotation_at_zero_current_is_diagnosed():
     """Effects that need current have no column then, and the search must handle this."""
     plan = tuple((speed, 0.0, 0.0) for speed in (160.0, -160.0, 80.0, -80.0, 40.0, -40.0, 120.0, -120.0))

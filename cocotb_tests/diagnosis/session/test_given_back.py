@@ -36,7 +36,7 @@ def sizes(worked):
     return Sizes(setup, setup.cells.y, setup.cells.y, np.ones(len(setup.view), bool), True)
 
 
-@pytest.mark.parametrize("name", halved(CATALOGUE, every=4))
+@pytest.mark.parametrize("name", halved(CATALOGUE, every=12))
 def test_the_improved_drive_leaves_no_misfit(name, tmp_path):
     effect = CATALOGUE[name]
     if isinstance(effect, MeasurementError) or name in STAYS:
@@ -53,6 +53,7 @@ def test_the_improved_drive_leaves_no_misfit(name, tmp_path):
     assert again.verdict == "no_mismatch" or left < MOST_LEFT, (left, again.sentence)
 
 
+@pytest.mark.slow
 def test_flux_map_is_written_and_read(tmp_path):
     """The curve itself as a table, which a drive file reads by its name."""
     effect = CATALOGUE["saturation"]

@@ -21,7 +21,9 @@ from fluxproof.diagnosis.loading.load import load_recording
 WEAK = Truth(psi=0.95 * PSI)
 
 
-@pytest.mark.parametrize("kind", [table, lambda truth: held(table(truth))], ids=["table", "held one after another"])
+@pytest.mark.parametrize(
+    "kind", [table, slowly(lambda truth: held(table(truth)))], ids=["table", "held one after another"]
+)
 def test_every_row_is_an_operating_point(tmp_path, kind):
     answer = answer_of(tmp_path, kind(WEAK))
     assert answer.verdict == "explained" and [e.name for e in answer.effects] == ["magnet_flux"]
@@ -78,7 +80,7 @@ def test_a_table_at_several_temperatures_shows_winding_and_magnets(tmp_path):
     assert found(answer)["resistance_temp_coeff_per_k"] == pytest.approx(0.0039, rel=0.1)
 
 
-@pytest.mark.parametrize("size, verdict", [(0.1, "no_mismatch"), (0.5, "ambiguous"), (3.0, "explained")])
+@pytest.mark.parametrize("size, verdict", [(0.1, "no_mismatch"), (0.5, "ambiguous"), slowly(3.0, "explained")])
 def test_either_of_two_causes_is_not_agreement(tmp_path, size, verdict):
     """Within so narrow a range of currents resistance and dead time imitate each other: one value has to say so."""
     points = [(w, 0.0, q) for w in (80.0, 200.0, 350.0, -300.0) for q in np.linspace(2.5, 4.5, 4)]
@@ -115,7 +117,7 @@ CORRECTED = {  # what a check corrects before the magnets are found
 }
 
 
-@pytest.mark.parametrize("found_by_check", CORRECTED)
+@pytest.mark.parametrize("found_by_check", halved(CORRECTED))
 def test_an_effect_behind_a_mistaken_column_of_a_table_is_named(tmp_path, found_by_check):
     answer = answer_of(tmp_path, CORRECTED[found_by_check](table(WEAK)))
     assert [e.name for e in answer.effects] == ["magnet_flux"] and not answer.conventions, answer.sentence
@@ -129,7 +131,7 @@ UNKNOWN = {
 }
 
 
-@pytest.mark.parametrize("name", UNKNOWN)
+@pytest.mark.parametrize("name", halved(UNKNOWN))
 def test_a_mistake_without_a_reading_is_not_explained_by_another(tmp_path, name):
     from fluxproof.diagnosis.session import run
 
@@ -148,7 +150,8 @@ OFF = {  # by a size that is no convention: the effect, its parameter and value
 }
 
 
-@pytest.mark.parametrize("name", halved(OFF, every=3))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", OFF)
 def test_an_error_is_named_up_to_the_ceiling_of_its_effect(tmp_path, name):
     change, effect, key, value = OFF[name]
     answer = answer_of(tmp_path, change(table()))

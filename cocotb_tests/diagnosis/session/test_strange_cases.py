@@ -31,7 +31,7 @@ from fluxproof.diagnosis.session import diagnose
         slowly(FOURTH, 7, {"current_scale", "delay", "resistance_temperature"}),  # the same
         slowly(FOURTH, 49, {"current_scale", "delay", "magnet_temperature"}),  # the same
         slowly(FIFTH, 22, set()),  # healthy: at one speed the codes beat with the sampling at order 9.5
-        (FIFTH, 1, set()),  # a dry friction that explained the load of one dwell, which was counted twice
+        slowly(FIFTH, 1, set()),  # a dry friction that explained the load of one dwell, which was counted twice
         # A gain of the bus and a scale of the currents scaled the remainder down.
         slowly(5122026, 7, {"inductance_q", "magnet_flux"}),
         slowly(SEED, 18, {"cogging", "sampling_skew"}),  # currents sampled while pulses begin: nothing
@@ -94,7 +94,7 @@ def test_a_name_is_judged_against_the_best_set_without_it(tmp_path):
         slowly(SEED, 12, "nonlinear towards full scale"),
         slowly(LATER, 28, "nonlinear towards full scale"),
         slowly(LATER, 27, "soft shaft"),
-        (LAST, 27, "soft shaft"),  # of a machine whose torque depends much on the angle
+        slowly(LAST, 27, "soft shaft"),  # of a machine whose torque depends much on the angle
     ],
 )
 def test_what_no_parameter_carries_is_told(seed, number, says, tmp_path):

@@ -51,6 +51,7 @@ def test_what_is_known_is_named_beside_late_currents():
     assert "filter" in answer.unknown_term.meaning and 0.5 < answer.explained_share < 0.97
 
 
+@pytest.mark.slow
 def test_a_small_lag_is_noted_beside_an_explanation():
     answer = answer_of(late(columns(GRID, (("magnet_flux_wb", 0.9 * MACHINE.magnet_flux_wb),)), 0.1 * T))
     assert [e.name for e in answer.effects] == ["magnet_flux"] and answer.verdict == "explained"

@@ -1,5 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Voltage loss of the inverter: dead time and device drops, and how both vanish near zero current."""
+"""Voltage loss of the inverter: dead time and device drops, and how both vanish near zero current.
+
+It depends on the current at the switching edges, not on the sampled one.  The two edges of a pulse see the ripple with
+opposite signs, so that their mean is the current in the middle of the pulse, half a dead time after the sample.  On a
+drive with a small inductance, the sampled current instead would leave a voltage perpendicular to the current, which
+looks like a wrong L_d.  The free curve is made of bumps: a ramp between two other ramps is nearly their mean.
+"""
 
 from collections.abc import Callable
 

@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The duties take effect later than assumed: the voltage is that of an earlier row.
 
-Either the mean of a period is late, as with a modulator that interpolates, or all pulses are and the samples see
-their ripple.
+Either the mean of a period is late, as with a modulator that interpolates or registers that load at the carrier's peak,
+or all pulses are, as with a carrier that is shifted against the trigger of the converters, and the samples see their
+ripple; orders 3 and 6 show which.  As long as the samples stay in the zero vector between the pulses, nothing is seen,
+so that usual gate drivers are harmless.  Around the delay of the recording the effect is linear: a chord as its
+formula, a tangent, the tangent of the ripple alone (a filter in front of the converters delays it), and the share of
+the torque's ripple that a transducer does not show.
 """
 
 import numpy as np

@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Magnets that lose a part of their flux at once, as after a pulse of negative i_d on a hot rotor: omega psi_step."""
+"""Magnets that lose a part of their flux at once, as after a pulse of negative i_d on a hot rotor: omega psi_step.
+
+The instant is searched between the dwells: visits to one operating point are compared with each other, and the instant
+after which their flux linkage differs most is taken, at the cost of its prior probability.  Within a dwell, and between
+two recordings, none is looked for.
+"""
 
 import numpy as np
 

@@ -21,9 +21,9 @@ TERMS = {
     "q_2": Term("q", lambda y: y * np.abs(y)),
     "d_2": Term("d", lambda x: x**2),
     "d_2s": Term("d", lambda x: x * np.abs(x)),
-    "q_3": Term("q", lambda y: y**3),
-    "d_3": Term("d", lambda x: x**3),
-    "q_5": Term("q", lambda y: y**5),
+    "q_3": Term("q", lambda y: y * y**2),
+    "d_3": Term("d", lambda x: x * x**2),
+    "q_5": Term("q", lambda y: y * (y**2) ** 2),
 }
 FORMULA, FURTHER = ("q_3", "d_3"), ("q_2", "q_5", "d_2", "d_2s")
 

@@ -22,11 +22,9 @@ class Bend(NamedTuple):
 def _errors(view, powers=(3, 5)):
     """{Bend: (b, m+1, 3)} errors of the phase currents [A] per unit of the coefficients."""
     x = view.phases(view.i) / view.machine.rated_current_a
-    return {
-        Bend(power, name): view.machine.rated_current_a * x**power * np.array(weights)
-        for power in powers
-        for name, weights in PHASES.items()
-    }
+    square = x * x  # a general power of an array takes sixty times as long
+    bent = {3: view.machine.rated_current_a * square * x, 5: view.machine.rated_current_a * square * square * x}
+    return {Bend(power, name): bent[power] * np.array(weights) for power in powers for name, weights in PHASES.items()}
 
 
 class CurrentBend(MeasurementError, FreeCurve):
