@@ -1,27 +1,33 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What points that were not fitted decide: an effect that worsens their prediction is rejected."""
+"""Effects that are rejected whatever their probability, so that the others are judged again without them.
+
+An effect worsens the prediction at points that were not fitted, or its size is compatible with zero (sized.py).
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.decide.decision import HELD_OUT, SIZELESS
 from fluxproof.diagnosis.decide.names import names_of
+from fluxproof.diagnosis.decide.sized import sizeless
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.search import within
 
 
 def without_idle(posterior, held):
-    """The posterior without effects that worsen the prediction at held-out points, whatever their probability.
+    """The posterior without effects that worsen the prediction at held-out points, and without names without a size.
 
-    The others are judged again without them; ``posterior.idle`` holds those that were rejected.
+    The others are judged again without them; ``posterior.idle`` says why they were rejected.
     """
     while True:
         names = names_of(posterior)
         asserted = names.asserted
-        idle = {n for n in asserted & set(posterior.best().names) if not helps(posterior, n, asserted, held)}
+        worse = {n for n in asserted & set(posterior.best().names) if not helps(posterior, n, asserted, held)}
+        idle = dict.fromkeys(worse, HELD_OUT) or dict.fromkeys(sizeless(names, posterior), SIZELESS)
         if not idle:
             return posterior
-        posterior = within(posterior, {n for _, fit in names.fits for n in fit.names} - idle, idle)
+        posterior = within(posterior, {n for _, fit in names.fits for n in fit.names} - idle.keys(), idle)
 
 
 def helps(posterior, name, asserted, held) -> bool:
