@@ -27,8 +27,8 @@ COMMON_U, COMMON_DC = 2e-5, 1e-5
 BALANCE_SUM = 2e-4
 # Error of the torque balance, relative to the rated torque: a transducer's linearity, slow friction.
 BALANCE_TORQUE = 3e-3
-# Scale of the discrepancy in units of the balance's error; its prior falls as the square beyond it.
-DISCREPANCY = 3.0
+# Scale of the discrepancy in units of the balance's error, and the exponent with which its prior falls beyond it.
+DISCREPANCY, STEEP = 3.0, 4.0
 # Relative error of the formula of an effect at each operating point.
 FORMULA = 0.01
 # Departure from the formula, relative to the usual one (an effect's ``curve``), that counts as no departure.
