@@ -74,6 +74,10 @@ class Effect:
         """Largest usual size, in units of ``size``: it sets the prior, and what is larger is impossible (too_large)."""
         return float("inf")
 
+    def often(self, nominal) -> float | None:
+        """Size up to which a larger one is no rarer, in units of ``size``; None: the mean of floor and ceiling."""
+        return None
+
     def size(self, c: dict, nominal) -> float:
         """Size of the effect as one number, in the unit of its ``floor``; c: {coefficient: value}, as everywhere."""
         return abs(next(iter(c.values())))
