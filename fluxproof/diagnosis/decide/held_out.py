@@ -31,8 +31,10 @@ def without_idle(posterior, held):
 
 
 def helps(posterior, name, asserted, held) -> bool:
-    """Whether ``asserted`` leaves no less of the held-out blocks, in units of the usual error, without ``name``.
+    """Whether ``asserted`` leaves no less without ``name``, of the held-out and of the fitted blocks together.
 
+    Both count alike, in units of the usual error: an effect that explains nothing leaves as much of the fitted blocks
+    without it and more of the others, while a drift that is only wrong about the minutes held out still explains most.
     Rows beyond the fitted operating points, of which the coefficients' own uncertainty exceeds that error, do not
     count, but for a mean torque in which a load may act, as that uncertainty is the load's.  The torque counts without
     a transducer too: friction and cogging of a free shaft show nowhere else.  Where a load may act that nobody
@@ -41,8 +43,10 @@ def helps(posterior, name, asserted, held) -> bool:
     best, setup = posterior.best(), posterior.setup
     cells, floor2 = setup.cells, setup.usual**2
     loads = (cells.channel == "torque") & (cells.order == 0) & (setup.load > 0.0)
-    rows = np.flatnonzero(cells.ok & held[cells.block])
-    rows = rows[loads[rows] | (_uncertain(best, asserted, rows) <= floor2[rows])]
+    rows = np.flatnonzero(cells.ok)
+    unseen = held[cells.block[rows]]
+    certain = ~unseen | loads[rows] | (_uncertain(best, asserted, rows) <= floor2[rows])
+    rows, unseen = rows[certain], unseen[certain]
     fewer = best.problem.fit([n for n in best.names if n != name])
     left2 = [fit.left(asserted & set(fit.names))[rows] ** 2 for fit in (best, fewer)]
     left2 = [np.where(loads[rows], np.minimum(x, k.DISCREPANCY**2 * floor2[rows]), x) for x in left2]
@@ -50,8 +54,10 @@ def helps(posterior, name, asserted, held) -> bool:
     # The ripple of a free shaft's acceleration is mostly noise, beside which its mean would not count.
     channels = np.where((cells.channel == "torque") & (cells.order == 0), "mean torque", cells.channel)[rows]
     for channel in np.unique(channels):
-        mine = channels == channel
-        left += [x[mine].sum() / floor2[rows][mine].sum() for x in left2]
+        for part in (unseen, ~unseen):
+            mine = (channels == channel) & part
+            if mine.any():
+                left += [x[mine].sum() / floor2[rows][mine].sum() for x in left2]
     return left[1] >= left[0]
 
 

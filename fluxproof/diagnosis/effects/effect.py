@@ -27,6 +27,9 @@ NEEDS = {
 }
 
 
+RELEVANT = 2.0  # of the floor: sensors of class 0.5, constants to two per cent, unless an effect declares another
+
+
 class Orders(NamedTuple):
     """Orders at which an effect appears in voltage, current sum or torque."""
 
@@ -69,6 +72,10 @@ class Effect:
     def floor(self, nominal) -> float:
         """Smallest size at which the effect is reported, in units of ``size``."""
         raise NotImplementedError
+
+    def relevant(self, nominal) -> float:
+        """Smallest size that an engineer would act on, in units of ``size``: a smaller one is a note, no cause."""
+        return RELEVANT * self.floor(nominal)
 
     def ceiling(self, nominal) -> float:
         """Largest usual size, in units of ``size``: it sets the prior, and what is larger is impossible (too_large)."""

@@ -12,7 +12,7 @@ PRESENT = 0.05
 IMPLAUSIBLE = 1e-3
 # Exponent with which an effect below the smallest size of practical interest becomes improbable: a steep edge, as
 # nobody asks for smaller effects, but not a hard one, so that a clearly significant effect is still found.
-SMALLER = 30.0
+SMALLER = 5.0
 # Error of the balance that no parameter explains, relative to the voltage of an operating point: PWM ripple, the
 # trapezoidal mean of the current, the converters' timing.
 BALANCE_U = 2e-4
@@ -85,6 +85,8 @@ ELSEWHERE = 0.1
 FLOOR = 3.0
 # The same for a single order, below which it is not evaluated.  0.44: 1.2 times the floor's rms.
 VISIBLE = 0.44
+# Order of the sum of three phase currents, relative to the rated current, that ordinary sensors leave: class 0.3.
+RELEVANT_SUM = 1.5e-3
 # Share of the misfit's power above the floor below which a residual is the formulas' own error.
 SMALL = 0.03
 # Least share of that power that the reported effects must explain.
