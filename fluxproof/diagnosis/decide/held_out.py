@@ -22,16 +22,15 @@ def without_idle(posterior, held):
     """
     while True:
         names = names_of(posterior)
-        asserted = names.asserted
-        worse = {n for n in asserted & set(posterior.best().names) if not helps(posterior, n, asserted, held)}
+        worse = {n for n in names.asserted & set(posterior.best().names) if not helps(posterior, n, held)}
         idle = dict.fromkeys(worse, HELD_OUT) or dict.fromkeys(sizeless(names, posterior), SIZELESS)
         if not idle:
             return posterior
         posterior = within(posterior, {n for _, fit in names.fits for n in fit.names} - idle.keys(), idle)
 
 
-def helps(posterior, name, asserted, held) -> bool:
-    """Whether ``asserted`` leaves no less without ``name``, of the held-out and of the fitted blocks together.
+def helps(posterior, name, held) -> bool:
+    """Whether the best set leaves no less without ``name``, of the held-out and of the fitted blocks together.
 
     Both count alike, in units of the usual error: an effect that explains nothing leaves as much of the fitted blocks
     without it and more of the others, while a drift that is only wrong about the minutes held out still explains most.
@@ -45,10 +44,10 @@ def helps(posterior, name, asserted, held) -> bool:
     loads = (cells.channel == "torque") & (cells.order == 0) & (setup.load > 0.0)
     rows = np.flatnonzero(cells.ok)
     unseen = held[cells.block[rows]]
-    certain = ~unseen | loads[rows] | (_uncertain(best, asserted, rows) <= floor2[rows])
+    certain = ~unseen | loads[rows] | (_uncertain(best, rows) <= floor2[rows])
     rows, unseen = rows[certain], unseen[certain]
     fewer = best.problem.fit([n for n in best.names if n != name])
-    left2 = [fit.left(asserted & set(fit.names))[rows] ** 2 for fit in (best, fewer)]
+    left2 = [fit.left()[rows] ** 2 for fit in (best, fewer)]
     left2 = [np.where(loads[rows], np.minimum(x, k.DISCREPANCY**2 * floor2[rows]), x) for x in left2]
     left = np.zeros(2)
     # The ripple of a free shaft's acceleration is mostly noise, beside which its mean would not count.
@@ -61,9 +60,8 @@ def helps(posterior, name, asserted, held) -> bool:
     return left[1] >= left[0]
 
 
-def _uncertain(fit, effects, rows) -> np.ndarray:
-    """Variance of what some effects of a fit explain of some rows, (k,)."""
-    mine = [j for j, n in enumerate(fit.take) if fit.problem.keys[n][0] in effects]
-    keys = [fit.problem.keys[fit.take[j]] for j in mine]
-    x = np.array([fit.problem.cells.columns[name][key][rows] for name, key in keys]).reshape(len(mine), len(rows))
-    return np.sum(x * (fit.cov[np.ix_(mine, mine)] @ x), axis=0)
+def _uncertain(fit, rows) -> np.ndarray:
+    """Variance of what a fit explains of some rows, (k,)."""
+    keys = [fit.problem.keys[n] for n in fit.take]
+    x = np.array([fit.problem.cells.columns[name][key][rows] for name, key in keys]).reshape(len(keys), len(rows))
+    return np.sum(x * (fit.cov @ x), axis=0)
