@@ -10,8 +10,8 @@ PRESENT = 0.05
 # Odds of a parameter outside of what its effect declares as plausible: absurd errors that cancel may fit as well as the
 # true ones.
 IMPLAUSIBLE = 1e-3
-# Exponent with which an effect below the smallest size of practical interest becomes improbable: a steep edge, as
-# nobody asks for smaller effects, but not a hard one, so that a clearly significant effect is still found.
+# Exponent with which an effect below the smallest size of practical interest becomes improbable: no steep edge, beside
+# which a real error of a sensor would be replaced by larger ones that cancel; what is found and too small is a note.
 SMALLER = 5.0
 # Error of the balance that no parameter explains, relative to the voltage of an operating point: PWM ripple, the
 # trapezoidal mean of the current, the converters' timing.
