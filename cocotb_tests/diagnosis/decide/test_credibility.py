@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from fluxproof.diagnosis.decide.credibility import MEDIAN, _seen_discrepancy, credibilities
-from fluxproof.diagnosis.decide.names import names_of
 
 
 def test_half_of_the_points_show_what_is_left_beside_a_load():
@@ -71,16 +70,3 @@ def test_an_error_of_a_sure_effect_imitates_what_is_like_it():
     apart, alike = (credibilities(two_effects(share)) for share in (0.05, 0.99))
     assert apart["large"] > 0.999 and alike["large"] > 0.999
     assert apart["small"] > 0.95 > alike["small"]
-
-
-def test_an_effect_is_as_credible_as_in_the_mean_of_its_sets():
-    """An iron loss of 1750 +- 860 ohm was named, as one of its sets left less beside it than the best one."""
-    sets = [(0.6, two_effects(0.99)), (0.4, two_effects(0.05))]
-    posterior = SimpleNamespace(
-        weights=lambda: sets, best=lambda: sets[0][1], present=lambda: {"large": 1.0, "small": 1.0},
-        setup=SimpleNamespace(effects={name: SimpleNamespace(named=True) for name in ("large", "small")}),
-    )  # fmt: skip
-    names = names_of(posterior)
-    assert set(names.named) == {"large"}
-    expected = sum(p * credibilities(fit)["small"] for p, fit in sets)
-    assert names.possible["small"] == pytest.approx(expected)

@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.drives import PAPER, each_drive, edited
+from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.effects import plausible_range
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.result import Estimate, NamedEffect
-from fluxproof.diagnosis.improve.improve import core_values, improved_toml, plant_of, write_improved
+from fluxproof.diagnosis.improve.improve import core_values, improved_toml, plant_of, to_write, write_improved
 from fluxproof.plant import (
     current_code,
     position_code,
@@ -179,3 +181,16 @@ def test_an_improved_drive_can_be_improved(tmp_path):
 def test_unknown_plant_key_is_rejected():
     with pytest.raises(ValueError, match="nearest known one is machine.resistance_ohm"):
         improved_toml(load_nominal(PAPER), [effect({"machine.resistanc_ohm": 2.0})])
+
+
+@pytest.mark.parametrize("name", sorted(n for n, e in CATALOGUE.items() if e.plausible))
+def test_an_implausible_size_is_not_written(name):
+    """A scale of the currents of -30 % was noted as implausible and written; drawn within and beyond every range."""
+    nominal, rng = load_nominal(PAPER), np.random.default_rng(len(name))
+    for key, limits in CATALOGUE[name].plausible.items():
+        low, high = plausible_range(limits, nominal)
+        width = high - low
+        for share in rng.uniform(-1.0, 2.0, 20).tolist():
+            within = 0.0 <= share <= 1.0
+            found = NamedEffect(name, 0.99, {key: Estimate(low + share * width, 1e-6 * width, "1")}, 0.9)
+            assert bool(to_write(nominal, [found], CATALOGUE)) is within

@@ -7,6 +7,7 @@ import itertools
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from cocotb_tests.support.diagnoses.samples import evidence, made_up
@@ -17,11 +18,13 @@ from fluxproof.diagnosis.build import build, worded
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.command import effect_table
 from fluxproof.diagnosis.decide.decision import Decision
+from fluxproof.diagnosis.decide.likeliest import AGAINST
 from fluxproof.diagnosis.effects import Parameter
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import Problem
 from fluxproof.diagnosis.ground.result import (
     VERDICTS,
+    BestFit,
     Estimate,
     Fit,
     Location,
@@ -34,6 +37,7 @@ from fluxproof.diagnosis.ground.result import (
 from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.physics import known_effects
 from fluxproof.diagnosis.words.advice import advice, point_text
+from fluxproof.diagnosis.words.best_fit import minor_notes
 from fluxproof.diagnosis.words.details import details
 from fluxproof.diagnosis.words.doubts import IMPLAUSIBLE, doubts
 from fluxproof.diagnosis.words.headline import MOST_LETTERS, headline
@@ -79,6 +83,48 @@ def test_a_misfit_above_the_floor_is_not_told_to_be_at_it():
     agree = made_up()["no_mismatch"]
     for floor, says in ((0.6, "1 V is at the noise floor"), (0.2, "1 V is within the usual error")):
         assert says in headline(replace(agree, fit=Fit(train_before=1.0, noise_floor=floor)), KNOWN)
+
+
+def drawn_fits():
+    """Unexplained answers with best fits of one to five effects of the catalogue, drawn, each with a reason."""
+    rng = np.random.default_rng(48)
+    for reason in [*AGAINST.values(), "it leaves 80 % of the misfit", "other sets of effects fit as well"]:
+        for count in (1, 1, 2, 3, 5):
+            effects = tuple(named(str(n)) for n in rng.choice(list(CATALOGUE), count, replace=False))
+            found = BestFit(effects, float(10 ** rng.uniform(-4.0, 0.0)), 0.1, reason)
+            yield replace(made_up()["unexplained"], unknown_term=None, best_fit=found)
+
+
+@pytest.mark.parametrize("answer", list(drawn_fits()), ids=lambda a: "-".join(e.name for e in a.best_fit.effects))
+def test_no_effect_is_called_known_beside_one_that_fits_best(answer):
+    """A magnet flux that had been found and rejected was told as: no known effect has this dependence."""
+    text, best = headline(answer, KNOWN), answer.best_fit
+    assert KNOWN[best.effects[0].name].title in text.lower() or KNOWN[best.effects[0].name].title in text
+    assert best.against in text and "probability" in text and len(text) <= MOST_LETTERS
+    told = advice(answer, NOMINAL, KNOWN)
+    assert KNOWN[best.effects[0].name].separated_by in told
+    assert not any("no known effect" in x or "no effect of the catalogue" in x for x in (text, told))
+    assert "The best fit leaves 0.1 V there." in details(replace(answer, fit=Fit(holdout_before=1.0)), text, KNOWN)
+
+
+def test_what_is_too_small_to_act_on_is_a_note():
+    gains = replace(
+        made_up()["no_mismatch"], minor=(named("current_gain"),), fit=Fit(train_before=1.0, noise_floor=0.2)
+    )
+    assert "too small to act on" in headline(gains, KNOWN)
+    (note,) = minor_notes(gains.minor, KNOWN)
+    assert "nequal gains" in note and note.endswith("too small to act on.")
+
+
+@pytest.mark.parametrize("name", sorted(CATALOGUE))
+def test_a_file_that_changes_nothing_is_not_recommended(name):
+    """What no drive can have is not written, and what is not written is not recommended."""
+    usual = replace(made_up()["explained"], effects=(replace(named(name), plant={"machine.x": 1.0}),))
+    assert "drive_improved.toml" not in advice(usual, NOMINAL, KNOWN, improved=False)
+    absurd = {p.name: Estimate(1e9, 1.0, p.unit) for p in CATALOGUE[name].parameters}
+    if CATALOGUE[name].plausible:
+        found = (replace(named(name), parameters=absurd, plant={"machine.x": 1.0}),)
+        assert "drive_improved.toml" not in advice(replace(usual, effects=found), NOMINAL, KNOWN)
 
 
 def test_much_that_is_left_beside_an_explanation_is_told():
@@ -253,7 +299,8 @@ def test_the_headline_knows_what_the_checks_found(tmp_path, monkeypatch):
         ("resistance_temperature", "resistance_temp_coeff_per_k", 0.0039, False),
         ("resistance_temperature", "resistance_temp_coeff_per_k", 0.0078, True),
         ("resistance", "resistance_ohm", 1.3 * NOMINAL.machine.resistance_ohm, False),
-        ("resistance", "resistance_ohm", 3.0 * NOMINAL.machine.resistance_ohm, True),
+        ("resistance", "resistance_ohm", 2.8 * NOMINAL.machine.resistance_ohm, False),
+        ("resistance", "resistance_ohm", 4.0 * NOMINAL.machine.resistance_ohm, True),
         ("magnet_temperature", "magnet_flux_drift_wb", 0.01, True),
     ],
 )

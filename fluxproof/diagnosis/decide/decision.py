@@ -12,6 +12,7 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.view import View
 from fluxproof.diagnosis.ground.result import (
+    BestFit,
     Convention,
     Evidence,
     Fit,
@@ -27,6 +28,7 @@ IMITATION = "imitation"  # a large residual may imitate it
 CONSTANT = "constant"  # at one operating point: an unexplained constant misfit may imitate its drift
 HELD_OUT = "held_out"  # it worsens the prediction at operating points that were not fitted
 NOISE = "noise"  # recording and simulation agree without it
+SIZELESS = "sizeless"  # its size is compatible with zero
 INSIGNIFICANT = "insignificant"  # its probability is below that of a name
 
 
@@ -89,6 +91,8 @@ class Decision:
     explained_share: float | None = None
     remainder: tuple[Remainder, ...] = ()
     unknown_term: UnknownTerm | None = None
+    best_fit: BestFit | None = None
+    minor: tuple[NamedEffect, ...] = ()
     alike: tuple[UnknownTerm, ...] = ()
     conventions: tuple[Convention, ...] = ()
     readings: tuple = ()

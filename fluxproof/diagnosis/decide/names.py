@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Which effects are named, which are ambiguous, and with what confidence.
 
-The confidence in a name is the probability of its presence, the sum over all sets that contain it, times its mean
-credibility in them (credibility.py).
+The confidence in a name is the probability of its presence, the sum over all sets that contain it.  What no model has
+is in the marginal likelihood of every set: no rule beyond it asks whether a remainder imitates an effect.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.shaft import measures_torque
 from fluxproof.diagnosis.decide.ambiguity import ambiguities
-from fluxproof.diagnosis.decide.credibility import credibilities
 from fluxproof.diagnosis.decide.estimates import estimates_in
 from fluxproof.diagnosis.effects.drive_file import Restates
 from fluxproof.diagnosis.ground import constants as k
@@ -27,7 +26,8 @@ class Names:
     """named: {effect: probability}; ambiguous: groups of which one effect is present.
 
     possible: {effect: probability} of effects that are neither named nor an alternative.  suspects: {effect:
-    probability} of causes that are as sure as a name but that no simulation carries.  fits: [(probability, fit)] of the
+    probability} of causes that are as sure as a name but that no simulation carries.  minor: {effect: probability} of
+    what is as sure as a name and too small to act on (relevant.py).  fits: [(probability, fit)] of the
     sets that hold the mass of the posterior, the most probable first.
     """
 
@@ -36,6 +36,7 @@ class Names:
     possible: dict[str, float]
     suspects: dict[str, float] = field(default_factory=dict)
     fits: tuple = ()
+    minor: dict[str, float] = field(default_factory=dict)
 
     @property
     def asserted(self) -> set[str]:
@@ -44,26 +45,22 @@ class Names:
 
     def only_possible(self, fit) -> set[str]:
         """Effects of a fit that are neither named, nor an alternative, nor as sure as a name."""
-        return set(fit.names) - self.asserted - set(self.suspects)
+        return set(fit.names) - self.asserted - set(self.suspects) - set(self.minor)
 
     def withheld(self, but=frozenset()) -> Names:
         """The same with nothing asserted but the effects ``but``: what else was named is possible."""
         kept = {n: p for n, p in self.named.items() if n in but}
         possible = {n: p for n, p in self.named.items() if n not in but}
         groups = tuple(g for g in self.ambiguous if but.issuperset(g))
-        return Names(kept, groups, self.possible | possible, {}, self.fits)
+        return Names(kept, groups, self.possible | possible, {}, self.fits, self.minor)
 
 
 def names_of(posterior) -> Names:
     """Names and ambiguities of a posterior."""
     kept = _mass(posterior)
     best, effects = posterior.best(), posterior.setup.effects
-    real, weight = {}, {}
-    for p, fit in kept:
-        for name, credit in credibilities(fit).items():
-            real[name] = real.get(name, 0.0) + p * credit
-            weight[name] = weight.get(name, 0.0) + p
-    present = {n: p * real[n] / weight[n] for n, p in posterior.present().items() if n in real}
+    seen = {n for _, fit in kept for n in fit.names}
+    present = {n: p for n, p in posterior.present().items() if n in seen}
     sure = {n: p for n, p in present.items() if p >= 1.0 - k.DOUBTED and n in best.names}
     named = {n: p for n, p in sure.items() if effects[n].named}
     suspects = {n: p for n, p in sure.items() if not effects[n].named}
