@@ -68,8 +68,9 @@ def names_of(posterior) -> Names:
     named = {n: p for n, p in sure.items() if effects[n].named}
     suspects = {n: p for n, p in sure.items() if not effects[n].named}
     groups = tuple(_with_what_depends(g, named, kept) for g in ambiguities(kept, present, sure, effects))
-    if not measures_torque(posterior.setup.view):  # which a wrong current changes, and a wrong nameplate does not
-        groups += tuple(_with_its_twin(n, effects[n], best.c[n]) for n in named if _has_a_twin(n, effects, groups))
+    twins = [n for n in named if _has_a_twin(n, effects, groups)]
+    if twins and not measures_torque(posterior.setup.view):  # which a wrong current changes, and a wrong nameplate not
+        groups += tuple(_with_its_twin(n, effects[n], best.c[n]) for n in twins)
     named = {n: p for n, p in named.items() if not any(n in g for g in groups)}
     grouped = {n for g in groups for n in g}
     possible = {n: p for n, p in present.items() if n not in sure and n not in grouped and p >= k.PRESENT}
