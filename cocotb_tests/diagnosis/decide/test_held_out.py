@@ -22,14 +22,14 @@ def test_a_mean_torque_counts_beside_the_noise_of_its_ripple(monkeypatch):
         block=np.zeros(210, int),
     )
     setup = SimpleNamespace(cells=cells, usual=noise, load=0.0)
-    without = SimpleNamespace(names=(), left=lambda told: fewer)
+    without = SimpleNamespace(names=(), left=lambda: fewer)
     best = SimpleNamespace(
         names=("a",),
-        left=lambda told: left if told else fewer,
+        left=lambda: left,
         problem=SimpleNamespace(setup=setup, fit=lambda names: without),
     )
-    monkeypatch.setattr(held_out, "_uncertain", lambda fit, told, rows: np.zeros(len(rows)))
+    monkeypatch.setattr(held_out, "_uncertain", lambda fit, rows: np.zeros(len(rows)))
     posterior = SimpleNamespace(best=lambda: best, setup=setup)
-    assert held_out.helps(posterior, "a", {"a"}, np.ones(1, bool))
+    assert held_out.helps(posterior, "a", np.ones(1, bool))
     left[means] = 4.1  # it explains nothing there
-    assert not held_out.helps(posterior, "a", {"a"}, np.ones(1, bool))
+    assert not held_out.helps(posterior, "a", np.ones(1, bool))

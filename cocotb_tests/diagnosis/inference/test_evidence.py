@@ -32,7 +32,7 @@ def value_of(y, doubt, x=None, curve=None, formula=0.01):
     rows = BalanceRows(y, np.full(len(y), NOISE**2), level, doubt, group, groups=1, loads=-1, load=0.0)
     most, wrong = np.full(effects, 100.0), np.full(effects, formula)
     effect = Columns(columns, np.ones(k), np.zeros(k, np.int64), np.arange(k) == 0, most, wrong)
-    return evidence(rows, effect, Prior(typical=3.0, least=1.0, straight=0.01, always=1.0), np.inf)
+    return evidence(rows, effect, Prior(typical=3.0, steep=1.0, least=1.0, straight=0.01, always=1.0), np.inf)
 
 
 def test_a_curve_that_is_not_needed_is_no_reason_against_its_effect():

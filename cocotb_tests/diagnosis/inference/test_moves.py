@@ -86,8 +86,8 @@ def test_a_posterior_within_some_effects_leaves_the_first_as_it_is():
     table = Table(own("ab", 100.0, 100.0) | own("b", 40.0, 40.0) | {("bc", "b"): 90.0} | own("bc", 90.0))
     posterior = search(table.setup)
     before = dict(posterior.fits)
-    less = within(posterior, "bc", "a")
-    assert posterior.best().names == ("a", "b") and less.best().names == ("b", "c") and less.idle == {"a"}
+    less = within(posterior, "bc", {"a": "taken out"})
+    assert posterior.best().names == ("a", "b") and less.best().names == ("b", "c") and less.idle == {"a": "taken out"}
     assert before == dict(posterior.fits) and not any("a" in names for names in less.fits)
     with pytest.raises(TypeError):
         posterior.fits["a",] = less.best()

@@ -22,11 +22,12 @@ def parabola(values):
 
 
 # Denser at the start, where warming is fastest.
-COURSE_KNOTS = np.array([0.0, 0.08, 0.25, 0.55, 1.0])
+COURSE_KNOTS = np.array([0.0, 0.08, 0.25, 0.4, 0.55, 0.7, 0.85, 1.0])
+BENDS = len(COURSE_KNOTS) - 2  # knots between the ends
 
 
 def courses(view):
-    """Slow drifts over time (4, b), piecewise linear and zero at the start of the recording."""
+    """Slow drifts over time (knots - 1, b), piecewise linear and zero at the start of the recording."""
     return hats(view.course, COURSE_KNOTS)
 
 

@@ -126,6 +126,9 @@ class DeadTime(LegLoss, FreeCurve, Caveat, Described):
     def floor(self, nominal):
         return 0.0002 * nominal.inverter.dc_bus_v
 
+    def relevant(self, nominal):
+        return 0.001 * nominal.inverter.dc_bus_v
+
     def ceiling(self, nominal):
         return 0.15 * nominal.inverter.dc_bus_v
 

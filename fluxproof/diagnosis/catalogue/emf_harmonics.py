@@ -41,6 +41,9 @@ class EmfHarmonics(FreeCurve, Described):
     def floor(self, nominal):
         return 0.0003
 
+    def relevant(self, nominal):
+        return 0.002
+
     def ceiling(self, nominal):
         return 0.3
 

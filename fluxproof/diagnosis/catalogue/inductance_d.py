@@ -45,6 +45,6 @@ EFFECT = InductanceD(
     signature="order 0, omega i_d on the q axis; and the slope of i_d",
     separated_by="two non-zero values of i_d",
     parameters=(Parameter("inductance_d_h", "H", "of the d axis", "L_d"),),
-    plausible={"inductance_d_h": (0.5, 1.9, "machine.inductance_d_h")},
+    plausible={"inductance_d_h": (0.33, 3.0, "machine.inductance_d_h")},
     otherwise="an inductance between two terminals is twice that of a phase; an incremental one is smaller",
 )

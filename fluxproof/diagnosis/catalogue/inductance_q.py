@@ -45,6 +45,6 @@ EFFECT = InductanceQ(
     signature="order 0, -omega i_q on the d axis; and the slope of i_q",
     separated_by="several i_q of both signs; rotation at zero current",
     parameters=(Parameter("inductance_q_h", "H", "of the q axis", "L_q"),),
-    plausible={"inductance_q_h": (0.5, 1.9, "machine.inductance_q_h")},
+    plausible={"inductance_q_h": (0.33, 3.0, "machine.inductance_q_h")},
     otherwise="an inductance between two terminals is twice that of a phase; an incremental one is smaller",
 )

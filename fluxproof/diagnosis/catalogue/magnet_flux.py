@@ -50,6 +50,6 @@ EFFECT = MagnetFlux(
     signature="order 0 on the q axis, proportional to speed, at every current including zero",
     separated_by="three speeds; rotation at zero current",
     parameters=(Parameter("magnet_flux_wb", "Wb", "peak, per phase", "flux linkage"),),
-    plausible={"magnet_flux_wb": (0.75, 1.25, "machine.magnet_flux_wb")},
+    plausible={"magnet_flux_wb": (0.5, 2.0, "machine.magnet_flux_wb")},
     otherwise="a drive file with the value between two terminals (1.73 times) or the rms value (0.71), or lost magnets",
 )

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.balance.curves import COURSE_KNOTS, course, courses, step_at_start
+from fluxproof.diagnosis.balance.curves import BENDS, COURSE_KNOTS, course, courses, step_at_start
 from fluxproof.diagnosis.effects import Drift, FluxEffect, Parameter, one, sigma
 
 MOST_AT_ONCE = 4.0  # largest ratio of the step at the start to the later change
@@ -28,7 +28,7 @@ class MagnetTemperature(FluxEffect, Drift):
     def _at_knots(c):
         """Change of flux since the start, at the knots of the course [Wb]."""
         drift = c["drift"] * COURSE_KNOTS
-        drift[1:4] += [c.get(f"course_{k}", 0.0) for k in range(3)]
+        drift[1:-1] += [c.get(f"course_{k}", 0.0) for k in range(BENDS)]
         return drift
 
     def size(self, c, nominal):

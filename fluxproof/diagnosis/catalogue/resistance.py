@@ -44,6 +44,6 @@ EFFECT = Resistance(
     signature="order 0, proportional to current, at every speed including standstill",
     separated_by="low speed and three loads; i_q reversed (against magnet_flux), several currents (against dead_time)",
     parameters=(Parameter("resistance_ohm", "ohm", "per phase, at the temperature of the recording", "resistance"),),
-    plausible={"resistance_ohm": (0.7, 2.0, "machine.resistance_ohm")},
+    plausible={"resistance_ohm": (0.33, 3.0, "machine.resistance_ohm")},
     otherwise="a resistance between two terminals is twice that of a phase; cables and contacts add to the winding",
 )

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.balance.curves import COURSE_KNOTS, course, courses, known_temperature, reference_c
+from fluxproof.diagnosis.balance.curves import BENDS, COURSE_KNOTS, course, courses, known_temperature, reference_c
 from fluxproof.diagnosis.catalogue.resistance import to_true_resistance
 from fluxproof.diagnosis.effects import DOUBT, Drift, FreeCurve, Parameter, Relative, one, sigma, voltage
 
@@ -20,7 +20,7 @@ def _later(view):
 def _change(c, by_alpha):
     """Largest change since the start [ohm]; by_alpha: that of a coefficient of 1/K [ohm K]."""
     drift = c.get("drift", 0.0) * COURSE_KNOTS + by_alpha * abs(c.get("alpha", 0.0))
-    drift[1:4] += [c.get(f"course_{k}", 0.0) for k in range(3)]
+    drift[1:-1] += [c.get(f"course_{k}", 0.0) for k in range(BENDS)]
     return float(np.max(np.abs(drift)))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.decide.decision import HELD_OUT, IMITATION, INSIGNIFICANT, NOISE, Basis, Decision, Withheld
+from fluxproof.diagnosis.decide.decision import IMITATION, INSIGNIFICANT, NOISE, Basis, Decision, Withheld
 from fluxproof.diagnosis.decide.estimates import named_effects
 from fluxproof.diagnosis.decide.locate import evidence, locate
 from fluxproof.diagnosis.decide.off_orders import Stray
@@ -62,11 +62,11 @@ def _withheld(j: Judgement, shares) -> tuple[Withheld, ...]:
     """Every effect that was found and is not asserted, with the rule that withholds it."""
     dropped = sorted(set(j.found.named) - set(j.names.named))
     possible = sorted(j.names.possible.items(), key=lambda entry: -entry[1])[:MOST_POSSIBLE]
-    why = NOISE if j.kind == "no_mismatch" else INSIGNIFICANT
+    unsure = NOISE if j.kind == "no_mismatch" else INSIGNIFICANT
     return (
         *(Withheld(n, IMITATION, shares[n]) for n in dropped),
-        *(Withheld(n, HELD_OUT) for n in sorted(j.posterior.idle)),
-        *(Withheld(n, why, p) for n, p in possible),
+        *(Withheld(n, why) for n, why in sorted(j.posterior.idle.items())),
+        *(Withheld(n, unsure, p) for n, p in possible),
     )
 
 

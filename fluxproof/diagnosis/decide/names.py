@@ -27,7 +27,8 @@ class Names:
     """named: {effect: probability}; ambiguous: groups of which one effect is present.
 
     possible: {effect: probability} of effects that are neither named nor an alternative.  suspects: {effect:
-    probability} of causes that are as sure as a name but that no simulation carries.  fits: [(probability, fit)] of the
+    probability} of causes that are as sure as a name but that no simulation carries.  minor: {effect: probability} of
+    what is as sure as a name and too small to act on (relevant.py).  fits: [(probability, fit)] of the
     sets that hold the mass of the posterior, the most probable first.
     """
 
@@ -36,6 +37,7 @@ class Names:
     possible: dict[str, float]
     suspects: dict[str, float] = field(default_factory=dict)
     fits: tuple = ()
+    minor: dict[str, float] = field(default_factory=dict)
 
     @property
     def asserted(self) -> set[str]:
@@ -44,14 +46,14 @@ class Names:
 
     def only_possible(self, fit) -> set[str]:
         """Effects of a fit that are neither named, nor an alternative, nor as sure as a name."""
-        return set(fit.names) - self.asserted - set(self.suspects)
+        return set(fit.names) - self.asserted - set(self.suspects) - set(self.minor)
 
     def withheld(self, but=frozenset()) -> Names:
         """The same with nothing asserted but the effects ``but``: what else was named is possible."""
         kept = {n: p for n, p in self.named.items() if n in but}
         possible = {n: p for n, p in self.named.items() if n not in but}
         groups = tuple(g for g in self.ambiguous if but.issuperset(g))
-        return Names(kept, groups, self.possible | possible, {}, self.fits)
+        return Names(kept, groups, self.possible | possible, {}, self.fits, self.minor)
 
 
 def names_of(posterior) -> Names:

@@ -18,8 +18,9 @@ from fluxproof.diagnosis.balance.holdout import holdout_blocks
 from fluxproof.diagnosis.balance.orders import at_order
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.decide.constant_misfit import explaining, resolution
-from fluxproof.diagnosis.decide.decision import CONSTANT, Basis, Decision, OnePoint, Withheld
+from fluxproof.diagnosis.decide.decision import CONSTANT, SIZELESS, Basis, Decision, OnePoint, Withheld
 from fluxproof.diagnosis.decide.locate import evidence, locate
+from fluxproof.diagnosis.decide.sized import has_size
 from fluxproof.diagnosis.decide.verdict import kind_of_one_point
 from fluxproof.diagnosis.effects.course import moved
 from fluxproof.diagnosis.ground import constants as k
@@ -51,14 +52,19 @@ def conclude_one_point(view) -> Decision:
     off = abs(constant) > resolution(view)
     point = OnePoint(constant, off, tuple(explaining(view, cells, effects, drifting, constant)), long)
     drift = _fit(cells, centred.y, best.residual, sigma, held) if long else _spread(raw - constant * off, sigma)
-    found = _sorted_out(best, tied, effects, view)
-    names, groups, beside, kind, fit = _ruled(found, best, drift, point, view)
+    drifted, open_ = _sorted_out(best, tied, effects, view)
     wider = fuller(fitter, best, effects, drifting, view) + with_copper(fitter, best, cells, view)
+    named = {n: _named(n, effects[n], best, wider, fitter, view) for n in drifted}
+    sized = tuple(n for n in drifted if has_size(named[n], effects[n], best.c[n], view.nominal))
+    names, groups, beside, kind, fit = _ruled((sized, open_), best, drift, point, view)
     return Decision(
         kind,
-        effects=tuple(_named(n, effects[n], best, wider, fitter, view) for n in names),
+        effects=tuple(named[n] for n in names),
         ambiguity=groups,
-        withheld=tuple(Withheld(n, CONSTANT) for n in beside),
+        withheld=(
+            *(Withheld(n, CONSTANT) for n in beside),
+            *(Withheld(n, SIZELESS) for n in drifted if n not in sized),
+        ),
         location=locate(view, cells, sigma),
         fit=fit,
         explained_share=fit.explained_share if kind != "no_mismatch" else None,

@@ -5,8 +5,9 @@
     2. names.py         what is probable and credible (credibility.py) is named, rivals are ambiguous (ambiguity.py)
     3. off_orders.py    a misfit outside the orders of the balance is looked for
     4. _as_noise        nothing is asserted where recording and simulation agree
-    5. verdict.py       the kind follows from the names and from the sizes of what is left
-    6. _beside_unknown  nothing is asserted beside a large unexplained residual
+    5. relevant.py      what is too small to act on is no cause
+    6. verdict.py       the kind follows from the names and from the sizes of what is left
+    7. _beside_unknown  nothing is asserted beside a large unexplained residual
 
 conclude.py adds the numbers.  A recording without a posterior: one_point.py, and ``not_compared`` below.  Where the
 recording or the drive file means something else than documented: interpretation.py.
@@ -22,6 +23,7 @@ from fluxproof.diagnosis.decide.decision import Decision
 from fluxproof.diagnosis.decide.held_out import without_idle
 from fluxproof.diagnosis.decide.names import Names, names_of
 from fluxproof.diagnosis.decide.off_orders import Stray, row_residual, stray_order, stray_swing, stray_torque
+from fluxproof.diagnosis.decide.relevant import relevant_names
 from fluxproof.diagnosis.decide.sizes import Sizes, left_by, measured_torque
 from fluxproof.diagnosis.decide.verdict import at_floor, is_usual, kind_of
 from fluxproof.diagnosis.effects import ShaftTorque
@@ -33,7 +35,7 @@ from fluxproof.diagnosis.inference.posterior import Posterior
 class Judgement:
     """What the rules decide on a posterior.
 
-    posterior: over the sets that are possible; names: what is asserted; found: the names before rule 6; explaining:
+    posterior: over the sets that are possible; names: what is asserted; found: the names before rule 7; explaining:
     effects that explain a part of the misfit; channel, share: where the explained share is counted, and what it is;
     stray: a misfit outside the orders of the balance; train, unseen: sizes on fitted and on held-out blocks.
     """
@@ -56,7 +58,7 @@ def judge(posterior, held) -> Judgement:
     posterior = setup.call(without_idle, posterior, held)
     names, best = setup.call(names_of, posterior), posterior.best()
     stray = setup.call(_off_orders, posterior, frozenset(names.suspects), held)
-    names = _as_noise(posterior, names, stray, held)
+    names = relevant_names(_as_noise(posterior, names, stray, held), best)
     explaining = _explaining(names, best)
     train, unseen = (_sizes(best, explaining, blocks) for blocks in (~held, held))
     channel = train.primary()
@@ -120,15 +122,15 @@ def _as_noise(posterior, names, stray, held) -> Names:
 
 
 def _beside_unknown(names, kind) -> Names:
-    """Rule 6: beside a large unknown part even a credible name may be its imitation."""
+    """Rule 7: beside a large unknown part even a credible name may be its imitation."""
     return replace(names, named={}, ambiguous=()) if kind == "unexplained" else names
 
 
 def _explaining(names, best) -> set[str]:
-    """Effects of the best set that explain a part of the misfit: those that are named, ambiguous, or likely."""
+    """Effects of the best set that explain a part of the misfit: named, ambiguous, likely, or too small to act on."""
     effects = best.problem.setup.effects
     likely = {n for n, p in names.possible.items() if p >= k.LIKELY and effects[n].named}
-    return (names.asserted | likely) & set(best.names) - set(names.suspects)
+    return (names.asserted | likely | set(names.minor)) & set(best.names) - set(names.suspects)
 
 
 def _sizes(best, explaining, blocks) -> Sizes:

@@ -54,7 +54,9 @@ class Sizes:
         ok &= ~loads & ~(bends & measured_torque)
         self.channels, self.orders = {}, {}
         count = max(int(blocks.sum()), 1)
-        noise2 = setup.floor**2, setup.usual**2
+        # A sum of the currents that ordinary sensors have is nothing that anybody would act on.
+        least = np.where(cells.channel == "sum", k.RELEVANT_SUM * setup.view.machine.rated_current_a, 0.0)
+        noise2 = setup.floor**2, np.maximum(setup.usual**2, least**2)
         for channel in np.unique(cells.channel):
             mine = ok & (cells.channel == channel)
             if mine.any() and (channel != "torque" or measured_torque):

@@ -13,7 +13,7 @@ def kind_of(names, train, held, channel, share, stray) -> str:
     misfit outside the orders.
     """
     if not names.asserted:
-        agrees = is_usual(train) and not stray and not standing_out(train)
+        agrees = is_usual(train, bool(names.minor)) and not stray and not standing_out(train)
         return "no_mismatch" if agrees and not names.suspects else "unexplained"
     if stray or not _is_whole(held, {c: held.share(c) for c in held.channels} | {channel: share}):
         return "partly_explained" if share is not None and share >= k.HALF else "unexplained"
@@ -54,9 +54,9 @@ def at_floor(sizes) -> bool:
     return all(s.before <= s.floor_times(k.FLOOR) for s in (*sizes.channels.values(), *orders))
 
 
-def is_usual(sizes) -> bool:
-    """Whether any recording of this kind may have the misfit before an explanation in every channel."""
-    return all(s.before <= s.above(k.FLOOR) for s in sizes.channels.values())
+def is_usual(sizes, explained=False) -> bool:
+    """Whether any recording of this kind may have the misfit in every channel; explained: what is left of it."""
+    return all((s.after if explained else s.before) <= s.above(k.FLOOR) for s in sizes.channels.values())
 
 
 def standing_out(sizes) -> list:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from fluxproof.diagnosis.effects.effect import Effect
 
 UNITS = ("_ohm", "_h", "_wb")  # of the keys of [machine]
+OFTEN = 2.0  # of a constant: a drive file is copied or guessed, so that a factor of three is no rare error
 LEAST_LEFT = 0.1  # of a parameter of the machine: a smaller one is not this machine
 
 
@@ -14,6 +15,9 @@ class Constant(Effect):
 
     rescales: tuple[str, ...] = ()  # signals and [machine] keys that it scales or offsets: i, u, u_dc, theta_e, ...
     exact: bool = True  # its formula cannot be wrong: no error of a formula is assumed
+
+    def often(self, nominal):
+        return OFTEN * getattr(nominal.machine, self.rescales[0]) if is_of_nameplate(self) else None
 
     def too_large(self, c, view):
         return super().too_large(c, view) or self.leaves_nothing(c, view.machine)

@@ -29,6 +29,9 @@ NEEDS = {
 }
 
 
+RELEVANT = 2.0  # of the floor: sensors of class 0.5, constants to two per cent, unless an effect declares another
+
+
 class Orders(NamedTuple):
     """Orders at which an effect appears in voltage, current sum or torque."""
 
@@ -72,9 +75,17 @@ class Effect:
         """Smallest size at which the effect is reported, in units of ``size``."""
         raise NotImplementedError
 
+    def relevant(self, nominal) -> float:
+        """Smallest size that an engineer would act on, in units of ``size``: a smaller one is a note, no cause."""
+        return RELEVANT * self.floor(nominal)
+
     def ceiling(self, nominal) -> float:
         """Largest usual size, in units of ``size``: it sets the prior, and what is larger is impossible (too_large)."""
         return float("inf")
+
+    def often(self, nominal) -> float | None:
+        """Size up to which a larger one is no rarer, in units of ``size``; None: the mean of floor and ceiling."""
+        return None
 
     def size(self, c: dict, nominal) -> float:
         """Size of the effect as one number, in the unit of its ``floor``; c: {coefficient: value}, as everywhere."""

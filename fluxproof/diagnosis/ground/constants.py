@@ -12,7 +12,7 @@ PRESENT = 0.05
 IMPLAUSIBLE = 1e-3
 # Exponent with which an effect below the smallest size of practical interest becomes improbable: a steep edge, as
 # nobody asks for smaller effects, but not a hard one, so that a clearly significant effect is still found.
-SMALLER = 30.0
+SMALLER = 5.0
 # Error of the balance that no parameter explains, relative to the voltage of an operating point: PWM ripple, the
 # trapezoidal mean of the current, the converters' timing.
 BALANCE_U = 2e-4
@@ -27,8 +27,8 @@ COMMON_U, COMMON_DC = 2e-5, 1e-5
 BALANCE_SUM = 2e-4
 # Error of the torque balance, relative to the rated torque: a transducer's linearity, slow friction.
 BALANCE_TORQUE = 3e-3
-# Scale of the discrepancy in units of the balance's error; its prior falls as the square beyond it.
-DISCREPANCY = 3.0
+# Scale of the discrepancy in units of the balance's error, and the exponent with which its prior falls beyond it.
+DISCREPANCY, STEEP = 3.0, 4.0
 # Relative error of the formula of an effect at each operating point.
 FORMULA = 0.01
 # Departure from the formula, relative to the usual one (an effect's ``curve``), that counts as no departure.
@@ -85,6 +85,8 @@ ELSEWHERE = 0.1
 FLOOR = 3.0
 # The same for a single order, below which it is not evaluated.  0.44: 1.2 times the floor's rms.
 VISIBLE = 0.44
+# Order of the sum of three phase currents, relative to the rated current, that ordinary sensors leave: class 0.3.
+RELEVANT_SUM = 1.5e-3
 # Share of the misfit's power above the floor below which a residual is the formulas' own error.
 SMALL = 0.03
 # Least share of that power that the reported effects must explain.

@@ -144,7 +144,7 @@ def _coefficients(rows, columns, prior, across, weighted, state):
         power += left[i] * left[i] / v[i]
     value = -0.5 * (power + log_m + logdet)
     for g in range(rows.groups):
-        value -= np.log(1.0 + (state.lam[g] / prior.typical) ** 2)
+        value -= prior.steep * np.log(1.0 + (state.lam[g] / prior.typical) ** 2)
     return value
 
 
@@ -236,7 +236,8 @@ def _discrepancy(rows, prior, state):
         best, chosen = -1e300, lam[g]
         for h in range(len(FACTORS)):
             tried = max(lam[g] * FACTORS[h], prior.least)
-            total = score[g, h] - 0.5 * np.log(products[g, h]) - np.log(1.0 + (tried / prior.typical) ** 2)
+            total = score[g, h] - 0.5 * np.log(products[g, h])
+            total -= prior.steep * np.log(1.0 + (tried / prior.typical) ** 2)
             if total > best:
                 best, chosen = total, tried
         moved = max(moved, abs(chosen / lam[g] - 1.0) if lam[g] > 0.0 else chosen)

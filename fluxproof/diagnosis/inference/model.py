@@ -8,7 +8,7 @@ a_e is the size of effect e in units of its floor of practical interest, with a 
 which a drive no longer runs; p_k is the coefficient that makes column k as large as the floor (of a curve: the share of
 it by which the curve may depart from the formula at most).  b_e is 1 for a column of the formula; for a column of the
 effect's free curve it has a log-uniform prior from ``straight`` to 1: a curve that is not needed is no reason against
-its effect.  lambda_g is the discrepancy of group g, with the prior 1 / (1 + (lambda / k)^2), and at least 1 where the
+its effect.  lambda_g is the discrepancy of group g, with the prior (1 + (lambda / k)^2)^-n, and at least 1 where the
 error of the balance is known.  w is the error that the curve of an effect may have at most, and mu_g <= 1 the share of
 it that is seen in group g: with all of it, a set would gain by a smaller effect with a smaller w.  All are found by
 expectation maximisation; the log evidence is exact for them.
@@ -52,6 +52,7 @@ class Prior(NamedTuple):
     """What holds for every set."""
 
     typical: float  # scale of the prior of lambda
+    steep: float  # its exponent
     least: float  # smallest lambda
     straight: float  # smallest b
     always: float  # odds against a load at every operating point

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,12 +16,12 @@ from fluxproof.diagnosis.inference.setup import Setup
 class Posterior:
     """All sets that were judged, the best linearisation of each.
 
-    idle: effects that were taken out; around: sets of measurement errors around whose best set others were judged.
+    idle: {effect: why it was taken out}; around: sets of measurement errors around whose best set others were judged.
     """
 
     setup: Setup
     fits: Mapping[tuple[str, ...], FittedSet]
-    idle: frozenset[str] = frozenset()
+    idle: Mapping[str, str] = field(default_factory=dict)
     around: frozenset[frozenset[str]] = frozenset()
 
     def best(self) -> FittedSet:

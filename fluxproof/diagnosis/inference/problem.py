@@ -59,7 +59,7 @@ class Problem:
     def _priors(self):
         p, nominal = self.p, self.view.nominal
         length = np.sqrt(np.mean((p.x / p.level[:, None]) ** 2, axis=0)) if len(p.y) else np.zeros(p.x.shape[1])
-        self.prior, self.most = np.zeros(len(self.keys)), {}
+        self.prior, self.most, self.often = np.zeros(len(self.keys)), {}, {}
         self.index = {}
         for name in self.cells.columns:
             effect = self.setup.effects[name]
@@ -76,6 +76,8 @@ class Problem:
                 self.prior[n] = effect.curve * effect.curve_scale(self.keys[n][1], scales, nominal)
             ceiling = effect.ceiling(nominal)
             self.most[name] = max(min(ceiling / floor, k.WIDEST), 2.0) if np.isfinite(ceiling) else k.UNBOUNDED
+            often = effect.often(nominal)
+            self.often[name] = float(np.sqrt(self.most[name])) if often is None else often / floor
             self.index[name] = cores + [n for n in curves if self.prior[n] > 0.0] if cores else []
 
     def condensed(self, rows):
@@ -134,13 +136,13 @@ class Problem:
         """The fit of a set of effects on this problem."""
         names = tuple(sorted(names))
         take, value, c, cov, a, lam, mu = self.setup.call(Problem.likelihood, self, names)
-        # Prior odds of every effect, and the prior of its size: even in the logarithm up to a typical size, the
-        # geometric mean of the smallest of interest and the largest possible one, and falling beyond.
+        # Prior odds of every effect, and the prior of its size: even in the logarithm up to a frequent size, and
+        # falling beyond.
         value += sum(
             self.setup.odds(n)
             + log_choice(self.setup.effects[n], self.setup.view)
             - np.log(np.log(self.most[n]))
-            - np.log1p(x**2 / self.most[n])
+            - np.log1p((x / self.often[n]) ** 2)
             for n, x in zip(names, a, strict=True)
         )
         found = FittedSet(self, names, float(value), take, c, cov, a, lam, mu)

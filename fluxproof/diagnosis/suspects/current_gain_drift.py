@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from fluxproof.diagnosis.balance.curves import course, courses
+from fluxproof.diagnosis.balance.curves import BENDS, course, courses
 from fluxproof.diagnosis.effects import FreeCurve, MeasurementError, Parameter, current_error, one, sigma
 
 
@@ -12,7 +12,7 @@ class CurrentGainDrift(MeasurementError, FreeCurve):
         return {"drift": current_error(view, view.i * course(view))}
 
     def free(self, view):
-        bends = courses(view)[:3, :, None]
+        bends = courses(view)[:BENDS, :, None]
         return {f"course_{k}": current_error(view, view.i * bend) for k, bend in enumerate(bends)}
 
     def size(self, c, nominal):
@@ -26,7 +26,7 @@ class CurrentGainDrift(MeasurementError, FreeCurve):
 
     def corrected(self, view, c):
         drift = c["drift"] * course(view) * np.ones_like(view.theta)
-        for k, bend in enumerate(courses(view)[:3, :, None]):
+        for k, bend in enumerate(courses(view)[:BENDS, :, None]):
             drift = drift + c.get(f"course_{k}", 0.0) * bend
         factor = 1.0 / (1.0 + drift)
         return view.replace(
