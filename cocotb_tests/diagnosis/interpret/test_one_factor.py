@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cocotb_tests.support.diagnoses.answers import answer_of, without
+from cocotb_tests.support.diagnoses.answers import answer_of, found, without
 from cocotb_tests.support.drives import L_D, L_Q, PAPER, PSI, RATED, R
 from cocotb_tests.support.recordings.bench_logs import GRID, Truth, table
 from cocotb_tests.support.recordings.from_equations import nominal_of, write
@@ -118,3 +118,19 @@ def test_a_turned_angle_needs_both_voltages():
     one = Recording("r", {n: np.zeros(4) for n in ("t", "i_d", "i_q", "u_q_ref")}, np.ones(4), np.ones(4))
     assert not turned.possible([one])
     assert turned.possible([replace(one, columns=one.columns | {"u_d_ref": np.zeros(4)})])
+
+
+@pytest.mark.parametrize("factor", [1.5**0.5, 1.5**-0.5, 2**0.5, 2**-0.5, 3**0.5])
+def test_a_locked_rotor_whose_resistance_is_off_by_a_usual_factor_shows_a_resistance(tmp_path, factor):
+    """Nothing else makes a voltage there: a factor on a column is one point of what the resistance covers.
+
+    A real actuator of 0.35 instead of 0.28 ohm, with plateaus of some per cent of noise, was told that its voltages are
+    line-to-line rms values.
+    """
+    rng = np.random.default_rng(4)
+    i_q = np.repeat([1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 4.0, -4.0, 5.0, -5.0], 3)
+    u = factor * R * i_q * (1.0 + 0.01 * rng.standard_normal(len(i_q)))
+    more = "\n[constants]\ni_d = 0\nomega_e = 0\ntheta_e = 0\n"
+    answer = answer_of(tmp_path, {"i_q": i_q, "u_q_ref": u}, more)
+    assert not answer.conventions and [e.name for e in answer.effects] == ["resistance"], answer.sentence
+    assert found(answer)["resistance_ohm"] == pytest.approx(factor * R, rel=0.02)

@@ -37,6 +37,7 @@ from fluxproof.diagnosis.inference.setup import Setup
 WIDE = 6  # readings to which a second one is added
 SEARCHED = 2  # readings, or pairs of them, that are judged with the whole search
 NOTHING = 1e-6  # of the usual error: no recording is as exact, so that a reading that leaves less has lost its rows
+EXCITED = 0.01  # of the voltage: what a constant has to make of it to be seen beside the error of a real table
 SAME = 1e-6  # of the balance: readings that leave the same
 KEYS = ("resistance_ohm", "inductance_d_h", "inductance_q_h", "magnet_flux_wb")
 
@@ -65,6 +66,8 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
     able = [r for r in _all(setup.view.nominal) if r.possible(recordings)]
     able = [r for r in able if all(getattr(setup.view.machine, key) for key in r.machine)]
     terms = Terms(setup)
+    if terms.excited() < 2:  # a factor on the columns is then a point of the free size of that one constant
+        able = [r for r in able if r.machine or r.volts == r.currents == 1.0]
     perfect = terms.perfect()
     plain = terms.judged(())
     free = max(map(_of_any_nameplate, posterior.fits.values())) + np.log(k.CLEARLY)
@@ -223,6 +226,12 @@ class Terms:
         scale = np.where(self._is(points, "sum"), _product(r.currents for r in readings), scale)
         value = self._evidence(points, y, scale) + len(readings) * np.log(k.MISREAD) + self.jacobian(readings)
         return Judged(tuple(readings), value, y / scale)
+
+    def excited(self) -> int:
+        """How many of R, L_d, L_q and psi_m make a part of the voltage that can be told from nothing."""
+        points, names = self.points(0.0)
+        size = dict(zip(names, np.linalg.norm(points.x[self._is(points, "u")], axis=0), strict=True))
+        return sum(size[name] > EXCITED * size["u"] for name in ("r", "d", "q", "psi"))
 
     def perfect(self) -> float:
         """The evidence of a balance that is met exactly: no set of effects reaches more."""
