@@ -22,7 +22,9 @@ def sizeless(names, posterior) -> set[str]:
     """Names of which every parameter is compatible with zero, its standard deviation that of the answer."""
     best, effects = posterior.best(), posterior.setup.effects
     nominal = best.problem.view.nominal
-    return {e.name for e in named_effects(names, posterior, {}) if not has_size(e, effects[e.name], best.c[e.name], nominal)}
+    return {
+        e.name for e in named_effects(names, posterior, {}) if not has_size(e, effects[e.name], best.c[e.name], nominal)
+    }
 
 
 def has_size(found: NamedEffect, effect, c, nominal) -> bool:

@@ -67,7 +67,9 @@ class Setup:
     def prior(self, points) -> Prior:
         """What the constants say of every set of effects on these points."""
         always = k.ALWAYS_LOADED if points.loads >= 0 else 1.0
-        return Prior(float(k.DISCREPANCY), float(k.STEEP), float(self.view.least_error), float(k.STRAIGHT), float(always))
+        return Prior(
+            float(k.DISCREPANCY), float(k.STEEP), float(self.view.least_error), float(k.STRAIGHT), float(always)
+        )
 
     def odds(self, name) -> float:
         """Log prior odds of an effect, zero (one to one) for one that is expected; a fleet may have shifted them."""

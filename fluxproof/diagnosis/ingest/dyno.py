@@ -21,7 +21,7 @@ LACKS = frozenset({"voltage"})
 
 
 def dq_of_dyno(columns: dict, nominal, notes: list) -> tuple[dict, frozenset]:
-    """(columns with all dq values, what they lack) of a dyno sheet; the same columns and nothing of other recordings."""
+    """(columns with all dq values, what they lack) of a dyno sheet; the same columns and nothing of others."""
     if not is_dyno(columns):
         return columns, frozenset()
     i_d = columns.get("i_d")
@@ -30,8 +30,8 @@ def dq_of_dyno(columns: dict, nominal, notes: list) -> tuple[dict, frozenset]:
         notes.append("i_d is not recorded and taken to be 0")
     u = steady_voltage(nominal.machine, i_d + 1j * columns["i_q"], columns["omega_e"])
     notes.append(
-        "no voltage is recorded: only the torque is compared; resistance, inductances and inverter cannot be diagnosed. "
-        "The control's u_q_ref would add R and separate flux and a scale of the currents, u_d_ref also inductances and "
+        "no voltage is recorded: only the torque is compared; resistance, inductances and inverter cannot be "
+        "diagnosed. The control's u_q_ref would add R and separate flux and a scale of the currents, u_d_ref also inductances and "
         "the angle"
     )
     return columns | {"i_d": i_d, "u_d_ref": u.real, "u_q_ref": u.imag}, LACKS

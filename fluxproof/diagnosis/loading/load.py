@@ -105,7 +105,9 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
         notes.append(f"no time column: rows are assumed to be {step:g} s apart")
     if plan.run and plan.run in table.columns:
         meta["run"] = table.columns[plan.run]
-    recording = Recording(str(path), columns, np.ones(n, bool), np.append(np.ones(n - 1, bool), False), meta=meta, lacks=lacks)
+    recording = Recording(
+        str(path), columns, np.ones(n, bool), np.append(np.ones(n - 1, bool), False), meta=meta, lacks=lacks
+    )
     recording.problems += [_renamed(problem, meta["columns"]) for problem in table.problems]
     return recording
 
