@@ -258,8 +258,8 @@ def _worth(missing, names) -> str:
     if not dyno or not any(text.startswith("voltages") for text in missing):
         return ""
     return (
-        ". Without voltages torque, i_q and omega_e (a dyno sheet) give flux and friction; the control's u_q_ref would add "
-        "R and a scale of the currents, u_d_ref also inductances and the angle"
+        ". Without voltages torque, i_q and omega_e (a dyno sheet) give flux and friction; the control's u_q_ref would "
+        "add R and a scale of the currents, u_d_ref also inductances and the angle"
     )
 
 

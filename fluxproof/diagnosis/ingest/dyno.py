@@ -31,7 +31,7 @@ def dq_of_dyno(columns: dict, nominal, notes: list) -> tuple[dict, frozenset]:
     u = steady_voltage(nominal.machine, i_d + 1j * columns["i_q"], columns["omega_e"])
     notes.append(
         "no voltage is recorded: only the torque is compared; resistance, inductances and inverter cannot be "
-        "diagnosed. The control's u_q_ref would add R and separate flux and a scale of the currents, u_d_ref also inductances and "
-        "the angle"
+        "diagnosed. The control's u_q_ref would add R and separate flux and a scale of the currents, u_d_ref also "
+        "inductances and the angle"
     )
     return columns | {"i_d": i_d, "u_d_ref": u.real, "u_q_ref": u.imag}, LACKS
