@@ -22,7 +22,8 @@ class Beside:
     """What a session found beside the physics.
 
     digital: of the replay; prior: the fleet that was the prior; before, read, after: notes of replay and prior, of the
-    readers, and of the written files, which stand before and after those on the physics.
+    readers, and of the written files, which stand before and after those on the physics.  improved: whether an improved
+    drive file differs from the given one, as far as one was written.
     """
 
     digital: Digital = Digital()
@@ -30,6 +31,7 @@ class Beside:
     before: tuple[str, ...] = ()
     read: tuple[str, ...] = ()
     after: tuple[str, ...] = ()
+    improved: bool = True
 
 
 def build(found: Explained, nominal: Nominal, beside: Beside | None = None) -> Diagnosis:
@@ -47,6 +49,8 @@ def build(found: Explained, nominal: Nominal, beside: Beside | None = None) -> D
         remainder=decision.remainder,
         conventions=decision.conventions,
         unknown_term=decision.unknown_term,
+        best_fit=decision.best_fit,
+        minor=decision.minor,
         rows=found.rows,
         problems=found.problems,
         digital=beside.digital,
@@ -54,13 +58,13 @@ def build(found: Explained, nominal: Nominal, beside: Beside | None = None) -> D
         evidence=decision.evidence,
         notes=(*beside.before, *notes_of(decision, effects), *beside.read),
     )
-    return worded(facts, read_drive(nominal, decision.readings), beside.after)
+    return worded(facts, read_drive(nominal, decision.readings), beside.after, beside.improved)
 
 
-def worded(facts: Diagnosis, nominal: Nominal, after: tuple[str, ...] = ()) -> Diagnosis:
+def worded(facts: Diagnosis, nominal: Nominal, after: tuple[str, ...] = (), improved=True) -> Diagnosis:
     """A diagnosis with its sentences, made of its other fields; one that is there stays.
 
-    nominal: the drive as it was read; after: notes that stand last.
+    nominal: the drive as it was read; after: notes that stand last; improved: as in Beside.
     """
     effects = known_effects()
     sentence = facts.sentence or headline(facts, effects)
@@ -68,6 +72,6 @@ def worded(facts: Diagnosis, nominal: Nominal, after: tuple[str, ...] = ()) -> D
         facts,
         sentence=sentence,
         details=details(facts, sentence, effects),
-        advice=advice(facts, nominal, effects),
+        advice=advice(facts, nominal, effects, improved),
         notes=(*facts.notes, *doubts(facts, nominal, effects), *after),
     )

@@ -35,16 +35,17 @@ from fluxproof.diagnosis.ground.recording import Problem, Recording, RecordingEr
 from fluxproof.diagnosis.ground.result import FILES, Diagnosis, Digital
 from fluxproof.diagnosis.improve.flux_found import NAME as FLUX_MAP
 from fluxproof.diagnosis.improve.flux_found import write_flux_map
-from fluxproof.diagnosis.improve.improve import write_improved
+from fluxproof.diagnosis.improve.improve import to_write, write_improved
 from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.overlay.compare import closed_loop
-from fluxproof.diagnosis.physics import Explained, explain, explained
+from fluxproof.diagnosis.physics import Explained, explain, explained, known_effects
 from fluxproof.diagnosis.replay.digital import replay
 from fluxproof.diagnosis.report import write_outputs
 from fluxproof.diagnosis.words.further_notes import FLUX_MAP as FLUX_MAP_NOTE
 from fluxproof.diagnosis.words.further_notes import loop_notes, not_improved, not_simulated, prior_note
 from fluxproof.files import refuse_overwriting
 from fluxproof.stage import together
+from golden_model.drive_file import read_tables
 from golden_model.drive_keys import DriveError
 
 IMPROVED, ANSWER = "drive_improved.toml", "diagnosis.json"
@@ -63,9 +64,9 @@ class Worked:
         """What was decided, and what it was decided from."""
         return self.explained.decision
 
-    def answer(self, *after: str) -> Diagnosis:
-        """The diagnosis; after: notes on the written files."""
-        return build(self.explained, self.nominal, replace(self.beside, after=after))
+    def answer(self, *after: str, improved=True) -> Diagnosis:
+        """The diagnosis; after: notes on the written files; improved: whether an improved drive file is among them."""
+        return build(self.explained, self.nominal, replace(self.beside, after=after, improved=improved))
 
 
 def diagnose(recordings, drive, progress=lambda text: None, prior=None) -> Diagnosis:
@@ -109,7 +110,7 @@ def _write(worked: Worked, recording, stage, out, progress) -> Diagnosis:
         laid_over, said = _overlay(*read, improved and (improved, out / IMPROVED))
         notes += said
     progress("writing the report")
-    answer = worked.answer(*notes)
+    answer = worked.answer(*notes, improved=improved is not None)
     write_outputs(answer, stage, nominal, laid_over)
     return answer
 
@@ -230,11 +231,16 @@ def _reading_notes(loaded) -> tuple[str, ...]:
 
 
 def _improved(nominal, decision, stage, recording, note) -> Path | None:
-    """Write the improved drive if anything was found; note: called with why it was not written."""
-    if not decision.effects and not decision.readings:
+    """Write the improved drive if anything in it differs; note: called with why it was not written."""
+    effects = to_write(read_drive(nominal, decision.readings), decision.effects, known_effects())
+    if not effects and not decision.readings:
         return None
     try:
-        return write_improved(nominal, decision.effects, stage / IMPROVED, decision.readings, recording)
+        written = write_improved(nominal, effects, stage / IMPROVED, decision.readings, recording)
+        if not nominal.path or read_tables(written) != read_tables(Path(nominal.path)):
+            return written
+        written.unlink()
+        return None
     except (DriveError, ValueError) as error:
         note(not_improved(IMPROVED, error))
         return None

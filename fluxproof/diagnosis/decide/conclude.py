@@ -7,6 +7,7 @@ import numpy as np
 
 from fluxproof.diagnosis.decide.decision import IMITATION, INSIGNIFICANT, NOISE, Basis, Decision, Withheld
 from fluxproof.diagnosis.decide.estimates import named_effects
+from fluxproof.diagnosis.decide.likeliest import likeliest
 from fluxproof.diagnosis.decide.locate import evidence, locate
 from fluxproof.diagnosis.decide.off_orders import Stray
 from fluxproof.diagnosis.decide.rules import Judgement, judge
@@ -37,6 +38,8 @@ def conclude(posterior, held) -> Decision:
         explained_share=j.share if explained == j.explaining else 0.0,
         remainder=_remainder(j),
         unknown_term=unknown,
+        best_fit=likeliest(j.searched, j.posterior.idle, held) if j.kind == "unexplained" else None,
+        minor=tuple(named_effects(j.names, j.posterior, shares, only=set(j.names.minor))),
         alike=_alike(j, held, unknown),
         evidence=evidence(view, (cells, cells.y), (cells, left), setup.noise, held),
         basis=Basis(view, held, j.posterior, _rivals(j.names)),

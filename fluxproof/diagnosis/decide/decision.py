@@ -12,6 +12,7 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.view import View
 from fluxproof.diagnosis.ground.result import (
+    BestFit,
     Convention,
     Evidence,
     Fit,
@@ -90,6 +91,8 @@ class Decision:
     explained_share: float | None = None
     remainder: tuple[Remainder, ...] = ()
     unknown_term: UnknownTerm | None = None
+    best_fit: BestFit | None = None
+    minor: tuple[NamedEffect, ...] = ()
     alike: tuple[UnknownTerm, ...] = ()
     conventions: tuple[Convention, ...] = ()
     readings: tuple = ()

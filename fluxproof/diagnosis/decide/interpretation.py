@@ -60,6 +60,7 @@ def under(readings, rivals, documented: Decision, found: Decision, level: float)
         fit=fit,
         explained_share=fit.explained_share,
         remainder=remainder,
+        best_fit=None,
         conventions=tuple(r.told(rivals) for r in readings),
         readings=readings,
         evidence=_evidence(documented.evidence, found.evidence, volts),

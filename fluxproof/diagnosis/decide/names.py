@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Which effects are named, which are ambiguous, and with what confidence.
 
-The confidence in a name is the probability of its presence, the sum over all sets that contain it, times its mean
-credibility in them (credibility.py).
+The confidence in a name is the probability of its presence, the sum over all sets that contain it.  What no model has
+is in the marginal likelihood of every set: no rule beyond it asks whether a remainder imitates an effect.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.shaft import measures_torque
 from fluxproof.diagnosis.decide.ambiguity import ambiguities
-from fluxproof.diagnosis.decide.credibility import credibilities
 from fluxproof.diagnosis.decide.estimates import estimates_in
 from fluxproof.diagnosis.effects.drive_file import Restates
 from fluxproof.diagnosis.ground import constants as k
@@ -61,12 +60,8 @@ def names_of(posterior) -> Names:
     """Names and ambiguities of a posterior."""
     kept = _mass(posterior)
     best, effects = posterior.best(), posterior.setup.effects
-    real, weight = {}, {}
-    for p, fit in kept:
-        for name, credit in credibilities(fit).items():
-            real[name] = real.get(name, 0.0) + p * credit
-            weight[name] = weight.get(name, 0.0) + p
-    present = {n: p * real[n] / weight[n] for n, p in posterior.present().items() if n in real}
+    seen = {n for _, fit in kept for n in fit.names}
+    present = {n: p for n, p in posterior.present().items() if n in seen}
     sure = {n: p for n, p in present.items() if p >= 1.0 - k.DOUBTED and n in best.names}
     named = {n: p for n, p in sure.items() if effects[n].named}
     suspects = {n: p for n, p in sure.items() if not effects[n].named}

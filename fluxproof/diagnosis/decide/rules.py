@@ -2,7 +2,7 @@
 """The rules by which a posterior becomes a verdict with names, in the order in which they apply.
 
     1. held_out.py      what worsens the prediction at points that were not fitted is rejected
-    2. names.py         what is probable and credible (credibility.py) is named, rivals are ambiguous (ambiguity.py)
+    2. names.py         what is probable is named, rivals are ambiguous (ambiguity.py)
     3. off_orders.py    a misfit outside the orders of the balance is looked for
     4. _as_noise        nothing is asserted where recording and simulation agree
     5. relevant.py      what is too small to act on is no cause
@@ -35,11 +35,13 @@ from fluxproof.diagnosis.inference.posterior import Posterior
 class Judgement:
     """What the rules decide on a posterior.
 
+    searched: the posterior before effects were rejected;
     posterior: over the sets that are possible; names: what is asserted; found: the names before rule 7; explaining:
     effects that explain a part of the misfit; channel, share: where the explained share is counted, and what it is;
     stray: a misfit outside the orders of the balance; train, unseen: sizes on fitted and on held-out blocks.
     """
 
+    searched: Posterior
     posterior: Posterior
     kind: str
     names: Names
@@ -54,7 +56,7 @@ class Judgement:
 
 def judge(posterior, held) -> Judgement:
     """The judgement on a posterior; held: (b,) blocks that were not fitted."""
-    setup = posterior.setup
+    setup, searched = posterior.setup, posterior
     posterior = setup.call(without_idle, posterior, held)
     names, best = setup.call(names_of, posterior), posterior.best()
     stray = setup.call(_off_orders, posterior, frozenset(names.suspects), held)
@@ -65,7 +67,7 @@ def judge(posterior, held) -> Judgement:
     share = unseen.share(channel) if _is_counted(explaining, setup) else None
     kind = kind_of(names, train, unseen, channel, share, stray)
     asserted = _beside_unknown(names, kind)
-    return Judgement(posterior, kind, asserted, names, explaining, channel, share, stray, train, unseen)
+    return Judgement(searched, posterior, kind, asserted, names, explaining, channel, share, stray, train, unseen)
 
 
 def not_compared(verdict: str) -> Decision:
@@ -122,7 +124,7 @@ def _as_noise(posterior, names, stray, held) -> Names:
 
 
 def _beside_unknown(names, kind) -> Names:
-    """Rule 7: beside a large unknown part even a credible name may be its imitation."""
+    """Rule 7: beside a large unknown part even a probable name may be its imitation."""
     return replace(names, named={}, ambiguous=()) if kind == "unexplained" else names
 
 

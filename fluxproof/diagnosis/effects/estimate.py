@@ -47,6 +47,11 @@ def plausible_range(limits, nominal) -> tuple[float, float]:
     return limits[0] * reference, limits[1] * reference
 
 
+def is_usual(parameters: dict[str, Estimate], plausible: dict, nominal) -> bool:
+    """Whether all parameters of an effect are believable; plausible: ``Effect.plausible``."""
+    return all(believable(parameters[key], limits, nominal) for key, limits in plausible.items() if key in parameters)
+
+
 def believable(estimate, limits, nominal) -> bool:
     """Whether an estimate is within what its effect declares as plausible, or doubtfully beyond it."""
     low, high = plausible_range(limits, nominal)

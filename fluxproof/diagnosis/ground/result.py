@@ -191,6 +191,20 @@ class UnknownTerm:
 
 
 @dataclass(frozen=True)
+class BestFit:
+    """The set of effects that fits a misfit best which nothing explains; it is not asserted.
+
+    probability: of this set among all that were judged; left: rms at held-out points with it, in the unit of the fit;
+    against: why it is not asserted, as a clause.  ``plant`` of its effects is empty.
+    """
+
+    effects: tuple[NamedEffect, ...]
+    probability: float
+    left: float
+    against: str
+
+
+@dataclass(frozen=True)
 class Digital:
     """Result of replaying the core.  first_difference: block, sample, signal, bit, recorded, golden."""
 
@@ -227,6 +241,8 @@ class Diagnosis:
     remainder: tuple[Remainder, ...] = ()  # the largest first
     conventions: tuple[Convention, ...] = ()
     unknown_term: UnknownTerm | None = None
+    best_fit: BestFit | None = None  # of an unexplained misfit
+    minor: tuple[NamedEffect, ...] = ()  # found, and too small to act on
     rows: int = 0
     problems: tuple[Problem, ...] = ()
     digital: Digital = Digital()

@@ -17,6 +17,7 @@ import tomlkit
 from tomlkit.items import AbstractTable, Array
 
 from fluxproof.diagnosis.conventions.apply import edit, read_drive
+from fluxproof.diagnosis.effects import is_usual
 from fluxproof.diagnosis.ground.nominal import Nominal
 from fluxproof.diagnosis.ground.plant_section import Plant, Timing, described_sensors, merged, plant_of
 from fluxproof.diagnosis.ground.result import NamedEffect
@@ -55,6 +56,15 @@ def improved_toml(nominal: Nominal, effects: list[NamedEffect], readings=(), rec
             table = plant.setdefault(section, tomlkit.table())
             _set(table, name, _absolute(nominal, key, value), "; ".join(_words(by_name[n]) for n in names))
     return tomlkit.dumps(document)
+
+
+def to_write(nominal: Nominal, effects, catalogue) -> list[NamedEffect]:
+    """The effects whose values belong into a drive file: none of an implausible size, which would only hide its cause.
+
+    catalogue: {name: Effect}.
+    """
+    plausible = {e.name: catalogue[e.name].plausible if e.name in catalogue else {} for e in effects}
+    return [e for e in effects if is_usual(e.parameters, plausible[e.name], nominal)]
 
 
 def write_improved(nominal: Nominal, effects: list[NamedEffect], path, readings=(), recording=None) -> Path:

@@ -7,12 +7,13 @@ import re
 
 import numpy as np
 
-from fluxproof.diagnosis.effects import MeasurementError
+from fluxproof.diagnosis.effects import MeasurementError, is_usual
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.quantities import RPM, decimals, fixed
 from fluxproof.diagnosis.words.phrases import CORRECTED, SIGNALS, capital, corrected, joined
 
 MOST_TITLES = 4
+MOST_CHECKED = 2  # causes of a best fit
 NEAR = 0.05  # of an order: closer ones are the same
 VARIABLES = {"omega": "the speed", "omega_e": "the speed", "i_d": "i_d", "i_q": "i_q", "i": "the current", "t": "time",
              "u_dc": "the bus voltage", "temp_winding": "the winding's temperature"}  # fmt: skip
@@ -24,8 +25,11 @@ HOW = {  # by the code of a finding
 }
 
 
-def advice(answer, nominal, effects) -> str:
-    """What to do after this answer; effects: the catalogue with the causes beyond it."""
+def advice(answer, nominal, effects, improved=True) -> str:
+    """What to do after this answer.
+
+    effects: the catalogue with the causes beyond it; improved: whether an improved drive file may differ.
+    """
     if answer.verdict == "bad_recording":
         return "Correct the findings of the checks, in the recording or in [columns] of the drive file; diagnose again."
     if answer.verdict == "digital_mismatch":
@@ -33,7 +37,7 @@ def advice(answer, nominal, effects) -> str:
             "Compare the registers and the build of the core with the drive file, and record again: the physics is "
             "diagnosed only when the controller agrees with its golden model."
         )
-    action, columns = _next(answer, nominal, effects), _columns(answer)
+    action, columns = _next(answer, nominal, effects, improved), _columns(answer)
     if not columns:
         return action
     if answer.verdict == "no_mismatch":  # the headline names it
@@ -49,7 +53,7 @@ def _columns(answer) -> str:
     return f"{where}{f': {joined(list(how))}' if how else ''}" if found else ""
 
 
-def _next(answer, nominal, effects) -> str:
+def _next(answer, nominal, effects, improved) -> str:
     """What to do after a verdict on the physics."""
     if answer.verdict == "no_mismatch":
         change = "No other change" if corrected(answer) else "No change"
@@ -59,27 +63,37 @@ def _next(answer, nominal, effects) -> str:
             f"Outside this range{torque} the drive file is not verified."
         )
     if answer.verdict == "explained":
-        return _take(answer, nominal, effects)
+        return _take(answer, nominal, effects, improved)
     if answer.verdict == "ambiguous":
         return _record(answer, nominal) or _separated(answer, effects)
     if answer.verdict == "partly_explained":
-        return f"{_take(answer, nominal, effects)} {_where(answer, nominal, effects)}"
+        return f"{_take(answer, nominal, effects, improved)} {_where(answer, nominal, effects)}"
     return _where(answer, nominal, effects)
 
 
-def _take(answer, nominal, effects) -> str:
+def _take(answer, nominal, effects, improved) -> str:
     """Which values of an explanation go into the drive file, and which belong to the recording."""
+    if answer.conventions and not improved:
+        return "Read the recording as stated and diagnose again: the drive file stays as it is."
     if answer.conventions:
         open_ = any(c.rivals for c in answer.conventions)
         rivals = " If an alternative interpretation is the right one, correct that instead." if open_ else ""
         found = " and contains the identified values" if answer.effects else ""
         return f"Use drive_improved.toml, which applies this interpretation{found}, and diagnose again.{rivals}"
-    if not any(e.plant for e in answer.effects):
+    usual = [e for e in answer.effects if e.name not in effects or _is_usual(e, effects, nominal)]
+    if answer.effects and not usual:
+        return "Check it on the drive first: a size that no usual drive has is not written to a drive file."
+    if not improved or not any(e.plant for e in usual):
         return "Correct the recording as stated: the drive file has no key for these effects."
-    trims = any(isinstance(effects.get(e.name), MeasurementError) for e in answer.effects)
+    trims = any(isinstance(effects.get(e.name), MeasurementError) for e in usual)
     later = " Measurement errors remain in this recording; the trims act from the next recording on." if trims else ""
     whole_periods = "".join(f" {text}" for text in _periods(answer, nominal, effects))
     return f"Simulate with drive_improved.toml, which contains the identified values.{later}{whole_periods}"
+
+
+def _is_usual(found, effects, nominal) -> bool:
+    """Whether a drive file may take the sizes of an effect."""
+    return is_usual(found.parameters, effects[found.name].plausible, nominal)
 
 
 def _periods(answer, nominal, effects) -> list[str]:
@@ -129,6 +143,10 @@ def _where(answer, nominal, effects) -> str:
     if u is not None and u.meaning:
         how = [e.separated_by for e in effects.values() if e.clause == u.meaning]
         return f"Check on the drive whether {u.meaning}.{f' Test: {how[0]}.' if how else ''}"
+    if answer.best_fit is not None:
+        names = [e.name for e in answer.best_fit.effects if e.name in effects]
+        how = list(dict.fromkeys(f"{effects[n].title}: {effects[n].separated_by}" for n in names))
+        return f"Check first what fits best. {'; '.join(capital(text) for text in how[:MOST_CHECKED])}."
     if not answer.remainder:
         return "Record more speeds and currents of both signs, so that the misfit can be located."
     r = max(answer.remainder, key=lambda part: part.share)

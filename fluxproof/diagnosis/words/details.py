@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.quantities import ascii_of, quantity
+from fluxproof.diagnosis.words.best_fit import left_by_best
 from fluxproof.diagnosis.words.phrases import CORRECTED, as_if, capital, part_text, percent_below, said
 
 TOLD = (
@@ -32,6 +33,8 @@ def details(answer, sentence, effects) -> str:
         fall = both if found and fit.holdout_after < fit.holdout_before else f"is {volts(fit.holdout_before)}"
         floor = f"the noise floor is {volts(fit.noise_floor)}"
         parts.append(f"The misfit at held-out operating points {fall}; {floor}.")
+        if answer.best_fit is not None:
+            parts.append(left_by_best(answer))
         if answer.verdict == "explained" and fit.holdout_after > k.MUCH_LEFT * fit.noise_floor:
             times = f"{fit.holdout_after / fit.noise_floor:.2g} times the noise floor"
             why = "a formula is inexact for this drive, or a small effect is missing"

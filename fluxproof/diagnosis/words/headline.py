@@ -12,6 +12,7 @@ import itertools
 
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.quantities import ascii_of, quantity
+from fluxproof.diagnosis.words.best_fit import best_fits
 from fluxproof.diagnosis.words.phrases import (
     as_if,
     capital,
@@ -64,6 +65,8 @@ def _variants(answer, effects) -> list[str]:
         at_floor = answer.fit.train_before**2 <= (1.0 + k.FLOOR) * answer.fit.noise_floor**2
         usual = "is at the noise floor" if at_floor else "is within the usual error for this kind of recording"
         floor = f"the misfit of {misfit} {usual}"
+        if answer.minor and not at_floor:
+            floor = f"what explains the misfit of {misfit} is too small to act on"
         if found := corrected(answer):
             once = [joined(found), f"{found[0]}, and {len(found) - 1} more", "the columns are interpreted differently"]
             return [f"Simulation and recording agree once corrected: {what}. {capital(floor)}." for what in once]
@@ -88,7 +91,11 @@ def _variants(answer, effects) -> list[str]:
             names = [capital(n) for n in named]
         return [f"{n} {share}; the residual is {where} and {c}." for n, c in _both(names, cause)]
     if answer.unknown_term is not None and answer.unknown_term.meaning:
-        return [f"No parameter of the simulation explains the misfit of {misfit}: it {c}." for c in cause]
+        looks = [f"No parameter of the simulation explains the misfit of {misfit}: it {c}" for c in cause]
+        beside = [f"; of those, {fits}" for fits in best_fits(answer, effects)]
+        return [*(f"{c}{b}." for c, b in _both(looks, [*beside, ""])), f"{looks[-1]}."]
+    if answer.best_fit is not None:
+        return [f"Not explained, {misfit}, {where}: {fits}." for fits in best_fits(answer, effects)]
     return [f"Unknown: no effect of the catalogue explains half of the misfit of {misfit}, {where}."]
 
 

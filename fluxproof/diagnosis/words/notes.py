@@ -16,6 +16,7 @@ from fluxproof.diagnosis.decide.decision import (
 )
 from fluxproof.diagnosis.effects.drive_file import caveat
 from fluxproof.diagnosis.words.balance_notes import balance_notes
+from fluxproof.diagnosis.words.best_fit import minor_notes
 from fluxproof.diagnosis.words.one_point_notes import one_point_notes
 from fluxproof.diagnosis.words.phrases import as_if, capital, percent_below, title_of
 
@@ -32,6 +33,7 @@ def notes_of(decision: Decision, effects) -> list[str]:
         *(f"The residual also looks {as_if(term)}." for term in decision.alike),
         *withheld(CONSTANT, HELD_OUT, SIZELESS),
         *withheld(NOISE, INSIGNIFICANT),
+        *minor_notes(decision.minor, effects),
         *_hint(decision.hinted),
     ]
 

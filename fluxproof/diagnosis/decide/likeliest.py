@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The causes that fit an unexplained misfit best, with their probability, and what speaks against them."""
+
+from __future__ import annotations
+
+from fluxproof.diagnosis.decide.decision import HELD_OUT, SIZELESS
+from fluxproof.diagnosis.decide.estimates import estimates_in
+from fluxproof.diagnosis.decide.sizes import Sizes, measured_torque
+from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.result import BestFit, NamedEffect
+
+AGAINST = {
+    HELD_OUT: "it predicts the held-out operating points worse than without",
+    SIZELESS: "its size is compatible with zero",
+}
+
+
+def likeliest(searched, idle, held) -> BestFit | None:
+    """The best fit among the sets that a simulation has parameters for; None if no effect is better than none.
+
+    searched: the posterior before effects were rejected; idle: {effect: why it was}; held: (b,) held-out blocks.
+    """
+    setup, weights = searched.setup, searched.weights()
+    able = [(p, fit) for p, fit in weights if all(setup.effects[n].named for n in fit.names)]
+    if not able or not able[0][1].names:
+        return None
+    p, fit = able[0]
+    before, left = (_left(setup, y, held) for y in (setup.cells.y, fit.left()))
+    if left >= before:
+        return None
+    present = searched.present()
+    effects = tuple(NamedEffect(n, min(present[n], 0.999), estimates_in(fit, n), 0.0) for n in fit.names)
+    return BestFit(effects, float(p), left, _against(p, fit, idle, left / before))
+
+
+def _left(setup, y, held) -> float:
+    """rms of a misfit (r,) at held-out points, of the voltage where it was compared."""
+    channels = Sizes(setup, setup.cells.y, y, held, measured_torque(setup)).channels
+    return channels["u"].after if "u" in channels else 0.0
+
+
+def _against(p, fit, idle, share) -> str:
+    """Why the best fit is not asserted; share: of the misfit's rms that it leaves."""
+    rejected = [idle[n] for n in fit.names if n in idle]
+    if rejected:
+        return AGAINST[rejected[0]]
+    if 1.0 - share**2 < k.HALF:
+        return f"it leaves {100 * share:.0f} % of the misfit"
+    return "other sets of effects fit as well" if p < 1.0 - k.DOUBTED else "what is left may imitate it"
