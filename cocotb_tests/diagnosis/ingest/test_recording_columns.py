@@ -257,5 +257,5 @@ def test_a_speed_without_a_unit_is_proposed_with_one(tmp_path, nominal):
 
 def test_a_dyno_sheet_is_told_what_its_missing_voltages_would_add(tmp_path):
     (tmp_path / "dyno.csv").write_text("rpm,iq (A),T measured (Nm),bus (A)\n" + "100,1.5,0.2,0.1\n" * 8)
-    with pytest.raises(RecordingError, match=r"dyno sheet\) are not diagnosed; .*u_q_ref would add R, flux"):
+    with pytest.raises(RecordingError, match=r"torque, i_q and omega_e \(a dyno sheet\) give flux and friction"):
         load_recording(tmp_path / "dyno.csv", nominal_of(tmp_path))

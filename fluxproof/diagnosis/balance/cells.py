@@ -77,6 +77,7 @@ class Projector:
         kept = self._apart(span)
         both = np.repeat((seen & kept)[:, :, None], 2, axis=2)
         both[:, :, 0] &= np.broadcast_to(getattr(view, "d_known", True), (b,))[:, None]
+        both &= view.has_voltage[:, None, None]
         ok = [both.ravel()]
         self.torque_seen = np.isfinite(view.torque).all(axis=1)
         self.real = {}

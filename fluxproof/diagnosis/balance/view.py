@@ -97,6 +97,12 @@ class View:
         lacks = self.lacks if self.lacks is not None else [()] * len(self)
         return np.array(["harmonics" not in lacking for lacking in lacks], bool)
 
+    @property
+    def has_voltage(self) -> np.ndarray:
+        """(b,) bool: blocks whose voltage was recorded."""
+        lacks = self.lacks if self.lacks is not None else [()] * len(self)
+        return np.array(["voltage" not in lacking for lacking in lacks], bool)
+
     def kept_where(self, blocks, changed):
         """``changed``, a view of the same blocks, with the data of this view in ``blocks`` (b,) bool."""
         if not blocks.any():

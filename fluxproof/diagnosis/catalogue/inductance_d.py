@@ -47,4 +47,5 @@ EFFECT = InductanceD(
     parameters=(Parameter("inductance_d_h", "H", "of the d axis", "L_d"),),
     plausible={"inductance_d_h": (0.33, 3.0, "machine.inductance_d_h")},
     otherwise="an inductance between two terminals is twice that of a phase; an incremental one is smaller",
+    needs=("voltage",),
 )

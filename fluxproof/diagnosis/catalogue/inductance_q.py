@@ -47,4 +47,5 @@ EFFECT = InductanceQ(
     parameters=(Parameter("inductance_q_h", "H", "of the q axis", "L_q"),),
     plausible={"inductance_q_h": (0.33, 3.0, "machine.inductance_q_h")},
     otherwise="an inductance between two terminals is twice that of a phase; an incremental one is smaller",
+    needs=("voltage",),
 )

@@ -93,5 +93,5 @@ EFFECT = MachineScale(
         Parameter("impedance_factor", "1", "true R, L_d and L_q over those of the drive file", "R, L_d and L_q times"),
         Parameter("machine_factor", "1", "true R, L_d, L_q and psi_m over those of the file", "R, L and flux times"),
     ),
-    needs=("current",),
+    needs=("current", "voltage"),
 )

@@ -25,7 +25,7 @@ ALIKE = 0.5  # of the air-gap torque: most that the opposite of a reversed torqu
 def check(recording, nominal) -> None:
     if not recording.has("torque", "omega_e"):
         return
-    i = _current(recording)
+    i = current_of(recording)
     if i is None:
         return
     driving, torque = airgap(nominal, i), recording["torque"]
@@ -42,7 +42,7 @@ def check(recording, nominal) -> None:
     recording.problems.append(Problem("sign", message, "torque", 0, int(good.sum()), "corrected"))
 
 
-def _current(recording) -> np.ndarray | None:
+def current_of(recording) -> np.ndarray | None:
     """(n,) dq current [A], or None."""
     if recording.has("i_d", "i_q"):
         return recording["i_d"] + 1j * recording["i_q"]

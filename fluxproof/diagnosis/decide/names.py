@@ -15,9 +15,11 @@ import numpy as np
 from fluxproof.diagnosis.balance.shaft import measures_torque
 from fluxproof.diagnosis.decide.ambiguity import ambiguities
 from fluxproof.diagnosis.decide.estimates import estimates_in
+from fluxproof.diagnosis.effects.constant import Constant
 from fluxproof.diagnosis.effects.drive_file import Restates
 from fluxproof.diagnosis.ground import constants as k
 
+TORQUE_PER_AMPERE = {("i",), ("magnet_flux_wb",)}  # what an effect rescales that changes it
 SURE = 3.0  # standard deviations
 
 
@@ -68,6 +70,9 @@ def names_of(posterior) -> Names:
     twins = [n for n in named if _has_a_twin(n, effects, groups)]
     if twins and not measures_torque(posterior.setup.view):  # which a wrong current changes, and a wrong nameplate not
         groups += tuple(_with_its_twin(n, effects[n], best.c[n]) for n in twins)
+    same = {n for n, e in effects.items() if isinstance(e, Constant) and e.rescales in TORQUE_PER_AMPERE}
+    if same & {*named, *itertools.chain(*groups)} and not posterior.setup.view.has_voltage.any():
+        groups = _with_the_same_torque(groups, same)
     named = {n: p for n, p in named.items() if not any(n in g for g in groups)}
     grouped = {n for g in groups for n in g}
     possible = {n: p for n, p in present.items() if n not in sure and n not in grouped and p >= k.PRESENT}
@@ -85,6 +90,12 @@ def _with_its_twin(name, effect, c) -> tuple[str, ...]:
     Small effects beside them may prefer one: a loss of 90 mV, found on currents recorded at 0.3, preferred the machine.
     """
     return tuple(sorted((name, effect.twin(c))))
+
+
+def _with_the_same_torque(groups, same: set[str]) -> tuple[tuple[str, ...], ...]:
+    """Ambiguities of a recording without voltages, in which factors on the torque per ampere are told together."""
+    touched = [g for g in groups if same & set(g)] or [()]
+    return (*(g for g in groups if not same & set(g)), *(tuple(sorted(same.union(g))) for g in touched))
 
 
 def _with_what_depends(group, named, kept) -> tuple[str, ...]:

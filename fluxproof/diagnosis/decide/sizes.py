@@ -109,9 +109,10 @@ def left_by(fit, effects) -> np.ndarray:
 
 
 def fit_of(train: Sizes, held: Sizes) -> Fit:
-    """The voltage misfit on fitted and on held-out blocks."""
-    a, b = train.channels.get("u", Size(0, 0, 0)), held.channels.get("u", Size(0, 0, 0))
-    return Fit("u_dq", "V", a.before, a.after, b.before, b.after, a.floor)
+    """The misfit of the voltage, or of the torque where none was recorded, on fitted and on held-out blocks."""
+    channel = "torque" if "torque" in train.channels and "u" not in train.channels else "u"
+    a, b = (sizes.channels.get(channel, Size(0, 0, 0)) for sizes in (train, held))
+    return Fit(*UNITS[channel], a.before, a.after, b.before, b.after, a.floor)
 
 
 def with_stray(remainder, stray, train) -> list[Remainder]:

@@ -253,13 +253,13 @@ def _demand(plan, names, path) -> None:
 
 
 def _worth(missing, names) -> str:
-    """What the missing voltages of a dyno sheet would add, as the end of a message; "" for other files."""
+    """What is enough of a dyno sheet, as the end of a message; "" for other files."""
     dyno = any(re.search(r"torque|drehmoment|\bN[ .*]?mm?\b", f"{name} {unit}", re.I) for name, unit in names.items())
     if not dyno or not any(text.startswith("voltages") for text in missing):
         return ""
     return (
-        ". Torque, current and speed alone (a dyno sheet) are not diagnosed; the control's u_q_ref would add R, flux "
-        "and a scale of the currents, u_d_ref also inductances and the angle"
+        ". Without voltages torque, i_q and omega_e (a dyno sheet) give flux and friction; the control's u_q_ref would "
+        "add R and a scale of the currents, u_d_ref also inductances and the angle"
     )
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Which canonical columns a voltage balance requires.
 
-Four kinds of recordings contain enough: currents with commanded voltages, dq values of which u_d may be absent, the
-terminal voltages of a machine that is driven without current (EMF run), of which one is enough, and voltage and power
-of an analyser beside dq currents or their references.
+Five kinds of recordings contain enough: currents with commanded voltages, dq values of which u_d may be absent, the
+terminal voltages of a machine that is driven without current (EMF run), of which one is enough, voltage and power
+of an analyser beside dq currents or their references, and torque, current and speed of a dyno sheet.
 """
 
 from __future__ import annotations
@@ -33,9 +33,15 @@ def is_analysed(have) -> bool:
     return currents and {"u_line", "p_el", "omega_e"} <= set(have) and not COMMANDED & set(have)
 
 
+def is_dyno(have) -> bool:
+    """Whether the names ``have`` are those of a dyno sheet: torque, current and speed, and no voltage."""
+    voltages = COMMANDED | set(PHASE_VOLTAGES + LINE_VOLTAGES) | {"u_line"}
+    return {"torque", "i_q", "omega_e"} <= set(have) and not voltages & set(have)
+
+
 def missing_columns(have: set[str]) -> list[str]:
     """What a balance lacks, as texts for a message; empty if the names ``have`` suffice."""
-    if is_emf_run(have) or is_analysed(have):
+    if is_emf_run(have) or is_analysed(have) or is_dyno(have):
         return []
     if "u_line" in have and not COMMANDED & have:
         needed = {"omega_e", "p_el", "i_d_ref", "i_q_ref"}

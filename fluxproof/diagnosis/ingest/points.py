@@ -45,14 +45,14 @@ def _rests_at_no_time(columns, nominal) -> bool:
     return rests and nominal.control.sample_time_s is None
 
 
-def as_table(path, columns: dict, meta: dict, problems) -> Recording:
-    """The Recording of a table; ``t`` is the number of the row."""
+def as_table(path, columns: dict, meta: dict, problems, lacks=frozenset()) -> Recording:
+    """The Recording of a table; ``t`` is the number of the row; lacks: what else it does not show."""
     n = len(columns["i_q"])
     meta["notes"].append(
         f"no time column, and the rows do not follow each other: each of the {n} rows is one operating point; a drift "
         "over time and a delay cannot be diagnosed from them"
     )
-    lacks = frozenset({"harmonics", "samples", "time"})
+    lacks = lacks | {"harmonics", "samples", "time"}
     recording = Recording(str(path), columns | {"t": np.arange(n, dtype=float)}, np.ones(n, bool), np.zeros(n, bool),
                           slow=True, points=True, lacks=lacks, meta=meta)  # fmt: skip
     recording.problems += problems

@@ -23,6 +23,7 @@ from fluxproof.diagnosis.ground.recording import Recording, RecordingError
 from fluxproof.diagnosis.ingest.analyser import dq_of_analyser
 from fluxproof.diagnosis.ingest.columns import Plan, canonical, plan_columns
 from fluxproof.diagnosis.ingest.demand import is_emf_run
+from fluxproof.diagnosis.ingest.dyno import dq_of_dyno
 from fluxproof.diagnosis.ingest.emf import emf_rows
 from fluxproof.diagnosis.ingest.points import as_table, is_table
 from fluxproof.diagnosis.ingest.units import conversion
@@ -86,6 +87,7 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
         columns[name] = np.full(n, value)
     notes += [f"{name} = {plan.assumed[name]:g} by [constants] of the drive file" for name in plan.stated]
     columns = dq_of_analyser(path, columns, nominal, notes)
+    columns, lacks = dq_of_dyno(columns, nominal, notes)
     if is_emf_run(columns):
         return emf_rows(path, columns, nominal, meta)
     if "t" in columns and n > 1 and np.ptp(columns["t"]) == 0.0:  # a date with too few digits, an unused counter
@@ -93,7 +95,7 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
         del columns["t"]
     timeless = ("t" not in columns or n == 1) and not table.meta.get("sample_time_s") and not plan.sample_time_s
     if timeless and is_table(columns, nominal):
-        return as_table(path, columns, meta, table.problems)
+        return as_table(path, columns, meta, table.problems, lacks)
     if "t" not in columns:
         known = table.meta.get("sample_time_s") or plan.sample_time_s
         step = known or nominal.sample_time_s
@@ -103,7 +105,9 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
         notes.append(f"no time column: rows are assumed to be {step:g} s apart")
     if plan.run and plan.run in table.columns:
         meta["run"] = table.columns[plan.run]
-    recording = Recording(str(path), columns, np.ones(n, bool), np.append(np.ones(n - 1, bool), False), meta=meta)
+    recording = Recording(
+        str(path), columns, np.ones(n, bool), np.append(np.ones(n - 1, bool), False), meta=meta, lacks=lacks
+    )
     recording.problems += [_renamed(problem, meta["columns"]) for problem in table.problems]
     return recording
 

@@ -21,6 +21,8 @@ def next_recording(decision: Decision, progress=lambda text: None) -> tuple[Plan
         return points_beside(basis.view, decision.ambiguity)
     progress("choosing the next recording")
     setup = basis.posterior.setup
+    if not basis.view.has_voltage.any():  # a point is planned by the voltage that it would show
+        return ()
     noise_v = float(np.nanmedian(np.abs(at_order(setup.cells, setup.noise, 0.0))))
     ambiguous = sorted({n for group in decision.ambiguity for n in group})
     return requests(setup, basis.rivals, noise_v, wants_cold(ambiguous, setup.effects, setup.view))

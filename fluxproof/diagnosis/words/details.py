@@ -8,7 +8,13 @@ from fluxproof.diagnosis.ground.quantities import ascii_of, quantity
 from fluxproof.diagnosis.words.best_fit import left_by_best
 from fluxproof.diagnosis.words.phrases import CORRECTED, as_if, capital, part_text, percent_below, said
 
-TOLD = ("gates_off", "stuck", "late", "lost_rows")  # codes of findings without which the figures cannot be read
+TOLD = (
+    "gates_off",
+    "stuck",
+    "late",
+    "lost_rows",
+    "torque_lost",
+)  # codes of findings without which the figures cannot be read
 UNUSED = "rows not used"
 
 
