@@ -46,4 +46,4 @@ def _against(p, fit, idle, share) -> str:
         return AGAINST[rejected[0]]
     if 1.0 - share**2 < k.HALF:
         return f"it leaves {100 * share:.0f} % of the misfit"
-    return "other sets of effects fit as well" if p < 1.0 - k.DOUBTED else "what is left may imitate it"
+    return "other sets of effects fit as well" if p < 1.0 - k.DOUBTED else "the residual may imitate it"
