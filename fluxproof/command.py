@@ -29,6 +29,7 @@ COMMANDS = {
     "commission": Command(
         "fluxproof.commission.command", "measure what a drive file cannot know, over the registers of a board"
     ),
+    "constants": Command("fluxproof.constants.command", "[machine] of a drive file from the numbers of a data sheet"),
     "diagnose": Command("fluxproof.diagnosis.command", "why a recording differs from its simulation"),
     "dump": Command("fluxproof.dump_capture", "convert a captured telemetry stream to the input of diagnose"),
     "fleet": Command(

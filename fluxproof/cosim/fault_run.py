@@ -137,6 +137,7 @@ class FaultRun:
         """What a read of each register would answer now, of those that the golden board knows."""
         file, latch = self.golden.registers, self.golden.state.of_core.of_fault_latch
         known = self.shown | {"fault_flags": latch.flags, "first_fault": latch.first}
+        known["irq_cause"] = self.golden.state.of_interrupts.causes
         if self.golden.samples:
             known |= self.golden.observed._asdict()
         file.status |= known
@@ -156,14 +157,16 @@ def cleared(at: int, **more: int) -> dict[int, dict[str, int]]:
 
 
 def host_and_pin(first: int) -> dict[int, dict[str, int]]:
-    """The host falls silent for longer than the heartbeat, comes back, writes in time; then the trip pin."""
+    """The host is silent for longer than the heartbeat, comes back, writes in time; then the trip pin, each cause of irq."""
     back = first + HEARTBEAT + 3
     return {
         first: {"heartbeat": HEARTBEAT},
         **cleared(back),
         **{back + k: {"i_q_ext": CURRENT + k} for k in (2, 4, 6)},
         back + 7: {"heartbeat": 0},
-        back + 10: {"clear_trip": 1, "irq_clear": 15},
+        **{back + 10 + k: {"irq_mask": mask} for k, mask in enumerate((14, 13, 11, 7, 15, 0))},
+        back + 17: {"clear_trip": 1, "irq_clear": 15},
+        back + 19: {"take_snapshot": 1},
     }
 
 
@@ -179,9 +182,9 @@ def serial_run() -> FaultRun:
         17: {"board_ignore": OVER | INDEX},
         **cleared(18, board_ignore=LOST),
         **host_and_pin(20),
-        **cleared(40),
+        **cleared(50),
     }
-    high, low = {4: 0, 9: 1, 14: 2}, {38: 1}  # period: phase whose stream is at its end
+    high, low = {4: 0, 9: 1, 14: 2}, {48: 1}  # period: phase whose stream is at its end
 
     def pins(inputs: dict[str, np.ndarray], clocks: np.ndarray, k: int) -> None:
         bits = np.tile((clocks // 4 % 2)[:, None], 4)  # half of the bits: no current, half of the bus range
