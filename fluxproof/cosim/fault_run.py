@@ -157,7 +157,7 @@ def cleared(at: int, **more: int) -> dict[int, dict[str, int]]:
 
 
 def host_and_pin(first: int) -> dict[int, dict[str, int]]:
-    """The host is silent for longer than the heartbeat, comes back, writes in time; then the trip pin, each cause of irq."""
+    """The host is silent for longer than the heartbeat and comes back; then the trip pin, and each cause of irq."""
     back = first + HEARTBEAT + 3
     return {
         first: {"heartbeat": HEARTBEAT},
