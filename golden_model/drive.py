@@ -55,13 +55,13 @@ class Inverter:
     dc_bus_v: float = positive("V", "nominal bus voltage")
     pwm_frequency_hz: float = positive("Hz", "one carrier up and down")
     dead_time_s: float = positive("s", "both gates of a leg off")
-    min_on_time_s: float | None = positive("s", "shortest time that a switch is on", None)
     min_pulse_s: float | None = positive("s", "shortest pulse of a leg, dead time included", None)
     v_switch_v: float = not_negative("V", "threshold of the switch", 0.0)
     v_diode_v: float = not_negative("V", "threshold of the diode", 0.0)
     r_switch_ohm: float = not_negative("ohm", "slope of the switch", 0.0)
     r_diode_ohm: float = not_negative("ohm", "slope of the diode", 0.0)
     zero_current_a: float = not_negative("A", "width of the zone around zero current", 0.0)
+    min_on_time_s: float | None = positive("s", "shortest time that a switch is on", None)
 
     @property
     def leg_pulse_s(self):

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import date, timedelta
+from itertools import product
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ import pytest
 from cocotb_tests.support.needs import skip_without_ghdl5
 from fluxproof.checkout import RTL
 from scripts.mutate import __main__ as command
-from scripts.mutate import defects, table
+from scripts.mutate import board, defects, table
 from scripts.mutate.equivalent import DIFFERENT, EQUIVALENT, UNKNOWN
 from scripts.mutate.judge import KILLED, WrongHarness, judge
 from scripts.mutate.subject import Subject
@@ -66,6 +67,21 @@ def test_netlist_that_is_not_its_model_is_an_error(tools):
     checks[len(checks) // 2, 2] ^= 1
     with pytest.raises(WrongHarness, match="without a mutation differs"):
         judge(SMALL, SEED, [replace(trial, checks=checks)])
+
+
+def test_the_boards_wiring_is_the_wiring_of_its_protection():
+    """What is drawn names a cell or port of the way from a fault to the gates; what a run cannot have is left out."""
+    line = "mutate -mode {} -module fluxproof_board -cell {} -port {} -portbit {}"
+    for index, (cell, port, bit, mode, drawn) in product(
+        range(2),
+        (
+            ("faults", "board_ignore", 0, "inv", None), ("core", "host_write", 0, "const1", True),
+            ("core", "trip", 0, "const0", True), ("registers", "k_edge", 3, "inv", False),
+            ("stream", "enable", 0, "inv", False), ("stage", "trip_pin", 0, "inv", True),
+        ),
+    ):  # fmt: skip
+        left_out = board.no_change(index).search(line.format(mode, cell, port, bit))
+        assert (left_out is None) == (index == 1 if drawn is None else drawn), (index, cell, port)
 
 
 def test_every_day_draws_others():

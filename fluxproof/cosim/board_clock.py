@@ -31,7 +31,19 @@ CONVERTER_PINS = tuple(p.name for p in current_front.BLOCK.inputs[:12])
 PINS = (*POSITION_PINS, *CONVERTER_PINS, "trip")
 AT_CONVERTERS, AT_TRIP = len(POSITION_PINS), len(PINS) - 1
 GATES = ("gate_high", "gate_low", "sample_trigger", "irq")
-SEEN = (*GATES, "serial_clock", "serial_out", "serial_drive", "convst", "cs_n", "sclk", "den", "daddr", "mod_clock")
+SEEN = (
+    *GATES,
+    "serial_clock",
+    "serial_out",
+    "serial_drive",
+    "convst",
+    "cs_n",
+    "sclk",
+    "den",
+    "daddr",
+    "mod_clock",
+    "brake",
+)
 # What is not a pin, of the same rows
 STATUS = tuple(board_map.STATUS)
 position_step, converter_step, forced_step = position_front.step, current_front.step, forced_position.step
@@ -239,6 +251,7 @@ def run_clocks(state, inputs, regs, b, pins, carrier_half, config, until_idle, s
         x[4], x[5], x[6] = position.serial_clock, position.serial_out, position.serial_drive
         x[7], x[8], x[9] = converters.convst, converters.cs_n, converters.sclk
         x[10], x[11], x[12] = converters.den, converters.daddr, converters.mod_clock
+        x[13] = core.brake
         y = status[k]
         y[0], y[1], y[2] = position.encoder_flags, position.encoder_count, position.index_count
         y[3], y[4], y[5] = position.illegal_count, position.lost_counts, position.bridged_count

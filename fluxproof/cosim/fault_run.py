@@ -27,6 +27,7 @@ from golden_model.registers import registers
 SLOT = 70  # clocks between two accesses: a setting waits for the end of a sample
 WRITE = ("s_axi_awaddr", "s_axi_wdata", "s_axi_awvalid", "s_axi_wvalid")
 READ = ("s_axi_araddr", "s_axi_arvalid")
+WATCHED = ("fault_flags", "first_fault", "board_flags", "board_first", "irq_cause")
 INDEX, LOST, OVER = 1, 2, 4  # bits of board_ignore
 CURRENT = PU.to_int(0.05)  # the voltage that a regulator without a motor asks for grows, and the duties with it
 HEARTBEAT = 3  # periods
@@ -118,7 +119,7 @@ class FaultRun:
             inputs = {name: np.zeros(self.length, np.int64) for name in PINS}
             self.pins(inputs, np.arange(begin, begin + self.length), k - self.settled)
             rows = np.stack([inputs[name] for name in PINS], axis=1)
-            names = self.readable[(k - self.periods) * self.per_period :][: self.per_period * (k >= self.periods)]
+            names = self._read_in(k, batch)
             for n, name in enumerate(names):
                 at = n * SLOT
                 bus["s_axi_arvalid"][at : at + 2] = 1
@@ -133,11 +134,19 @@ class FaultRun:
             ]
             yield Chunk(inputs | bus, seen, status, 0.0, k, reads)
 
+    def _read_in(self, k: int, batch: dict[str, int]) -> list[str]:
+        """Registers read in period ``k``: those of faults while the script is silent, after it each one once."""
+        if k >= self.periods:
+            return self.readable[(k - self.periods) * self.per_period :][: self.per_period]
+        turn = k * self.per_period % len(WATCHED)
+        return [] if batch or k < self.settled else [*WATCHED, *WATCHED][turn : turn + self.per_period]
+
     def _words(self) -> dict[str, int]:
         """What a read of each register would answer now, of those that the golden board knows."""
         file, latch = self.golden.registers, self.golden.state.of_core.of_fault_latch
         known = self.shown | {"fault_flags": latch.flags, "first_fault": latch.first}
-        if self.golden.samples:
+        known["irq_cause"] = self.golden.state.of_interrupts.causes
+        if self.golden.observed is not None:
             known |= self.golden.observed._asdict()
         file.status |= known
         return {
@@ -156,14 +165,16 @@ def cleared(at: int, **more: int) -> dict[int, dict[str, int]]:
 
 
 def host_and_pin(first: int) -> dict[int, dict[str, int]]:
-    """The host falls silent for longer than the heartbeat, comes back, writes in time; then the trip pin."""
+    """The host is silent for longer than the heartbeat and comes back; then the trip pin, and each cause of irq."""
     back = first + HEARTBEAT + 3
     return {
         first: {"heartbeat": HEARTBEAT},
         **cleared(back),
         **{back + k: {"i_q_ext": CURRENT + k} for k in (2, 4, 6)},
         back + 7: {"heartbeat": 0},
-        back + 10: {"clear_trip": 1, "irq_clear": 15},
+        **{back + 10 + k: {"irq_mask": mask} for k, mask in enumerate((14, 13, 11, 7, 15, 0))},
+        back + 17: {"clear_trip": 1, "irq_clear": 15},
+        back + 19: {"take_snapshot": 1},
     }
 
 
@@ -179,9 +190,9 @@ def serial_run() -> FaultRun:
         17: {"board_ignore": OVER | INDEX},
         **cleared(18, board_ignore=LOST),
         **host_and_pin(20),
-        **cleared(40),
+        **cleared(50),
     }
-    high, low = {4: 0, 9: 1, 14: 2}, {38: 1}  # period: phase whose stream is at its end
+    high, low = {4: 0, 9: 1, 14: 2}, {48: 1}  # period: phase whose stream is at its end
 
     def pins(inputs: dict[str, np.ndarray], clocks: np.ndarray, k: int) -> None:
         bits = np.tile((clocks // 4 % 2)[:, None], 4)  # half of the bits: no current, half of the bus range
@@ -213,8 +224,9 @@ def edges_run() -> FaultRun:
         inputs["pin_z"][:] = count % 16 == place
         at = 5 + np.arange(len(clocks) // 160) * 160
         inputs["codes_valid_in"][at] = 1
-        for name in ("code_a_in", "code_b_in", "code_c_in", "code_u_dc_in"):
+        for name in ("code_a_in", "code_b_in", "code_c_in"):
             inputs[name][:] = 1 << 15
+        inputs["code_u_dc_in"][:] = 46000 if k in (29, 30) else 1 << 15  # 702 V: the brake resistor is on
         inputs["trip"][70:71] = k == 20 + HEARTBEAT + 11
 
     return FaultRun(edges(), script, pins)

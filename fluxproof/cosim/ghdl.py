@@ -102,7 +102,7 @@ def run(
             build_dir=built,
             test_dir=folder,
             test_args=["--std=08", f"--workdir={built}"],
-            plusargs=["--ieee-asserts=disable", *_waves(folder)],
+            plusargs=["--ieee-asserts=disable", *waves(folder)],
             extra_env={
                 "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
                 # Else pytest recompiles all that is imported (numba, scipy) to explain asserts: seconds in every run.
@@ -115,7 +115,7 @@ def run(
     return folder
 
 
-def _waves(folder: Path) -> list[str]:
+def waves(folder: Path) -> list[str]:
     """GHDL's option for the waveform of a run where FLUXPROOF_WAVES is set; only FST takes every top."""
     return [f"--fst={folder / 'waves.fst'}"] if os.environ.get("FLUXPROOF_WAVES") else []
 

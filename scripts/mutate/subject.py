@@ -121,7 +121,11 @@ class Board:
     index: int
     of: str = board.TOP
     flat: bool = False
-    no_change: None = None
+
+    @property
+    def no_change(self) -> re.Pattern[str]:
+        """What is not drawn."""
+        return board.no_change(self.index)
 
     @property
     def name(self) -> str:
@@ -140,7 +144,7 @@ class Board:
         return synthesize(sources_of(self.top), self.top, board.RUNS[self.index]().generics())
 
     def count(self, cells: int) -> int:
-        return board.MUTANTS
+        return board.DRAWN
 
     def trials(self) -> list[Trial]:
         """Its run through the pins."""

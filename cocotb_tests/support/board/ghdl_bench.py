@@ -183,7 +183,7 @@ def main(run: str, periods: int, folder: Path) -> int:
     command = [str(program / NAME)]
     if not Path(command[0]).exists():  # the mcode back end makes no program
         command = ["ghdl", "-r", "--std=08", "--work=top", f"--workdir={program}", NAME]
-    command += [*(f"-g{n}={v}" for n, v in loop.generics().items()), "--ieee-asserts=disable"]
+    command += [*(f"-g{n}={v}" for n, v in loop.generics().items()), "--ieee-asserts=disable", *ghdl.waves(folder)]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     if done.returncode:
         print((done.stdout + done.stderr)[-2000:], file=sys.stderr)
