@@ -30,7 +30,7 @@ def rows(only: str):
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="rough", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="rough", description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--only", default="", help="only situations whose name or drive contains this text")
     arguments, found = parser.parse_args(), []
     for row in rows(arguments.only):

@@ -17,6 +17,7 @@ from fluxproof.plant import sensor_params
 from fluxproof.plant.sensors import current_code, position_code, u_dc_code
 from golden_model.board_registers import board_generics, board_registers
 from golden_model.drive import Drive
+from golden_model.drive_keys import needed
 from golden_model.io import board_faults, fault_latch
 from golden_model.registers import registers
 from golden_model.units import TURN_RAD, from_si
@@ -123,10 +124,11 @@ class RoughBoard:
     def _encoder(self, pins: dict[str, np.ndarray], angle: np.ndarray) -> None:
         e, pairs = self.drive.encoder, self.drive.machine.pole_pairs
         if e.kind == "abz":
-            place = angle / TURN_RAD * e.counts
+            counts = needed(e.counts)
+            place = angle / TURN_RAD * counts
             for name, (rises, high) in TURN_BITS.items():
                 pins[name] = ((place - rises) % LINE < high).astype(np.int64)
-            pins["pin_z"] = (place % e.counts < 1.0).astype(np.int64)
+            pins["pin_z"] = (place % counts < 1.0).astype(np.int64)
         elif e.kind == "hall":
             turns = angle * pairs / TURN_RAD
             for k, x in enumerate("abc"):

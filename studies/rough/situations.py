@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from fluxproof.checkout import DRIVES
 from golden_model.drive import Drive, load, with_carrier
+from golden_model.drive_keys import needed
 from studies.rough.board import RoughBoard
 
 CARRIER_HALF = 250
@@ -97,7 +98,7 @@ def stuck_z(level: int):
 
 def spike(drive: Drive, _part: float) -> tuple[str, bool]:
     """A pulse of 300 ns on Z at rest, in the phase of the index."""
-    board = RoughBoard(drive, theta_m=100.3 / drive.encoder.counts * 2 * math.pi)
+    board = RoughBoard(drive, theta_m=100.3 / needed(drive.encoder.counts) * 2 * math.pi)
     clocks = max(round(300e-9 * board.clock_hz), 5)
 
     def spoil(pins, board):
