@@ -26,7 +26,7 @@ unexport PYTHONHOME
 
 PYTHON_RUN := .venv/bin/python
 
-.PHONY: help setup generate test slow demo papers bench blind fleet sensitivity real mishaps compare timeline mutate verilog synth ecp5 lint registers package prove faults board fuzz lock clean distclean
+.PHONY: help setup generate test slow demo papers bench blind fleet sensitivity real mishaps compare timeline mutate verilog synth ecp5 lint registers package prove faults rough board fuzz lock clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -88,6 +88,9 @@ board: setup ## measure the figures of encoders, converters and the closed loop 
 
 faults: setup ## inject faults: sensors, bus, strobes, registers; RTL against golden core
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.faults $(ARGS)
+
+rough: setup ## put the golden board through power-up, lost and wrong sensors (ARGS='--only Hall')
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.rough $(ARGS)
 
 fuzz: setup ## draw hostile and damaged inputs for ten minutes, print what escapes (ARGS='--minutes 60 --seed 3 --only readers')
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m scripts.fuzz $(ARGS)

@@ -4,8 +4,9 @@
 The default limits lie outside the range of a healthy drive: overcurrent at twice the current limit, the
 sum of the currents at a fifth of the rated current, the bus at a tenth and 1.3 times its nominal value, no sample for
 1.5 periods, 1.2 times the rated speed, a tenth of it against the reference for 20 ms without braking, a sensor that
-shows 1 % of the rated current at rest, a stall of 0.1 s, an encoder that contradicts the EMF for 3 ms or 1.5 over the
-bandwidth of the current loop. An open load is reported and does not trip. The position may deviate from its linear extrapolation by 5e-4 turn plus four codes, or four counts of an
+shows 1 % of the rated current at rest, a stall of 0.1 s, an encoder that contradicts the EMF for 2.8 ms or 1.4 over the
+bandwidth of the current loop. An open load is reported and does not trip. The position may deviate from its linear
+extrapolation by 5e-4 turn plus four codes, or four counts of an
 incremental encoder: no shaft accelerates that much within a sample, and a frozen code is detected from that rotation
 per sample on.
 """
@@ -30,8 +31,8 @@ JUMP_CODES, JUMP_TURN = 4, 5e-4  # of the position, per sample: quantisation of 
 # The EMF may be wrong by: of that at rated speed; of the voltage of dead time and devices, a six-step vector of 4/3 of
 # the leg's; of R*i, for a hot winding; of the flux; of L*i at the limit.  Hall sensors: 30 degrees within a sector.
 EMF_OF_RATED, EMF_OF_LEG, EMF_OF_R, EMF_OF_PSI, EMF_OF_LI, EMF_OF_PSI_HALL = 0.02, 1.6, 0.5, 0.3, 0.3, 0.8
-# So long at least; over the bandwidth of the current loop; with Hall sensors; sectors in that time whose EMF is not seen
-EMF_S, EMF_OF_LOOP, EMF_HALL_S, EMF_SECTORS = 3e-3, 1.5, 0.05, 2.0
+# So long at least; over the current loop's bandwidth; with Hall sensors; sectors in that time, whose EMF is not seen
+EMF_S, EMF_OF_LOOP, EMF_HALL_S, EMF_SECTORS = 2.8e-3, 1.4, 0.05, 1.0
 ALWAYS_REPORTED = ("trip", "early")  # the pin always trips, a rejected sample never does
 
 

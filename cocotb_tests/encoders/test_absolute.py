@@ -192,3 +192,12 @@ def test_too_long_a_gap_trips_until_cleared():
     assert lost[:24].max() == 0 and lost[25:].min() == 1
     never, _ = bridge(10, 0.0, list(range(10)), 0.0)
     assert never["position_lost"][-1] == 1 and never["position_valid"].max() == 0
+
+
+def test_every_second_frame_bad_while_the_speed_changes():
+    """delta follows: each bridged place is off by the acceleration of a few samples, however long it lasts."""
+    growth = 1e-4
+    out, true = bridge(120, 0.01, list(range(11, 120, 2)), 0.0, growth=growth)
+    error = off(out["code_theta"], true) / (1 << BITS)
+    assert np.abs(error[20:]).max() <= 3.0 * growth + 2 / (1 << BITS)
+    assert out["position_lost"].max() == 0

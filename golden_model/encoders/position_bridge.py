@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A position code for each sample from an absolute encoder: delay compensated, bad frames bridged, then a trip.
 
-    good frame since the last sample:  place(k) = code,  delta(k) = code - place(k-1)
+    good frame since the last sample:  place(k) = code,  delta(k) = delta + (code - place(k-1) - delta) / n
     none:                              place(k) = place(k-1) + delta,  one more sample is bridged
     code_theta(k) = place(k) + delay * delta
 
 ``delay`` is the time from the instant at which the encoder latches its position to the sampling instant of the
-currents, in samples; it includes the frame where that ends after the sample.  delta is kept at the first good frame
-after a bridge, because that frame's difference holds the error of the whole bridge.
+currents, in samples; it includes the frame where that ends after the sample.  The first good frame after a bridge holds
+the error of the whole bridge: n is 1 without a bridge, 2 after one bridged sample, 4 after two or three; after more
+delta is kept.  So delta follows where every second frame is bad.
 More than ``bridge_max`` samples without a good frame set ``position_lost``, which stays until ``clear_faults``; so does
 an encoder that never answered.  ``position_valid`` is 1 from the first good frame on.
-Formats: codes of POSITION_BITS, modulo one turn; delay U(2,16).  Rounding: delay * delta half up.
+Formats: codes of POSITION_BITS, modulo one turn; delay U(2,16).  Rounding: delay * delta half up, a part of an
+error is cut (floor).
 ``code_theta`` and ``code_valid`` follow ``sample`` after ``TAKES`` clocks; samples are at least as far apart.
 """
 
@@ -27,6 +29,7 @@ DELAY = Format(0, 2, 16)
 DROP = DELAY.frac_bits
 BRIDGE = Format(0, 8, 0)
 BRIDGE_MAX = BRIDGE.hi
+LONGEST = 3  # bridged samples whose error still tells delta
 TAKES = 4
 
 
@@ -58,8 +61,9 @@ def step(state, frame_code, frame_valid, sample, clear_faults, delay, bridge_max
     # Stage 1: place and delta
     if sample and s.fresh:
         place, seen, missing = s.frame, 1, 0
-        if s.seen and s.missing == 0:
-            delta = wrap_s(s.frame - s.place, position_bits)
+        if s.seen and s.missing <= LONGEST:
+            error = wrap_s(s.frame - s.place - s.delta, position_bits)
+            delta = wrap_s(s.delta + (error >> min(s.missing, 2)), position_bits)
     elif sample:
         place = wrap(s.place + s.delta, position_bits)
         missing = min(s.missing + 1, BRIDGE_MAX)
@@ -115,6 +119,13 @@ def stimuli(rng, config):
                     run(1, sample=1, delay=delay)
                     run(TAKES, delay=delay)
             run(1, clear_faults=1, delay=delay)
+    for bridged in (1, 1, 1, 2, 3, 4, 1, 2, 3, 4):  # frames that come every so often, at speeds that change
+        for k in range(8):
+            place += int(rng.integers(-size // 40, size // 40))
+            run(1, frame_code=place % size, frame_valid=1, bridge_max=9)
+            for _ in range(bridged + (k == 5)):
+                run(1, sample=1, bridge_max=9)
+                run(TAKES, bridge_max=9)
     run(1, frame_valid=1, sample=1, frame_code=5)
     run(300, sample=1, bridge_max=BRIDGE_MAX)
     run(EVENTS_MAX, sample=1)

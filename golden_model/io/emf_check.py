@@ -14,7 +14,8 @@ counted.
 |x| of a vector is the larger component and half the smaller one, up to 12 % more than its length.
 
 Formats: fluxes S(1,23), model saturated; products cut (floor) to 2**-16; |x| of a component is the one's complement
-where it is negative; |i| saturates at 2, the difference at 1, mean is cut from three bits below.  The counter saturates.
+where it is negative; |i| saturates at 2, the difference at 1, mean is cut from three bits below.  The counter
+saturates.
 """
 
 from collections import namedtuple

@@ -1,13 +1,14 @@
 -- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: a position code for each sample from an absolute encoder: delay compensated, bad frames bridged, then trip.
---   good frame since the last sample:  place(k) = code,  delta(k) = code - place(k-1)
+--   good frame since the last sample:  place(k) = code,  delta(k) = delta(k-1) + (code - place(k-1) - delta(k-1)) / n
 --   none:                              place(k) = place(k-1) + delta,  one more sample is bridged
 --   code_theta(k) = place(k) + delay * delta
--- delay is the time from the encoder's latch to the sampling instant of the currents, in samples.  delta is kept at the
--- first good frame after a bridge, because that frame's difference holds the error of the whole bridge.
+-- delay is the time from the encoder's latch to the sampling instant of the currents, in samples.  The first good
+-- frame after a bridge holds the error of the whole bridge: n is 1 without a bridge, 2 after one bridged sample, 4 after
+-- two or three; after more delta is kept.
 -- More than bridge_max samples without a good frame set position_lost, which stays until clear_faults.
 -- Formats: codes modulo one turn; delay U(2,16).  Latency: 1 (every clock is a sample), sample to code_theta 4.
--- Rounding: delay * delta half up.
+-- Rounding: delay * delta half up, a part of an error is cut (floor).
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -55,9 +56,16 @@ architecture rtl of position_bridge is
   signal ahead_3   : signed(POSITION_BITS + 19 - POSITION_BRIDGE_DROP downto 0);
 
   signal bridge : std_logic;
+  signal error  : signed(POSITION_BITS - 1 downto 0);  -- of a bridged place
+  signal part   : signed(POSITION_BITS - 1 downto 0);
 begin
   valid(0) <= sample;
   bridge   <= sample and not state.fresh;
+  error    <= signed(state.frame - state.place) - state.delta;
+  part     <= error when state.missing = 0 else
+              shift_right(error, 1) when state.missing = 1 else
+              shift_right(error, 2) when state.missing <= 3 else
+              (others => '0');
 
   process (clk)
     variable counted : unsigned(11 downto 0);
@@ -75,8 +83,8 @@ begin
         state.place   <= state.frame;
         state.seen    <= '1';
         state.missing <= (others => '0');
-        if state.seen = '1' and state.missing = 0 then
-          state.delta <= signed(state.frame - state.place);
+        if state.seen = '1' then
+          state.delta <= state.delta + part;
         end if;
       elsif sample = '1' then
         state.place <= state.place + unsigned(state.delta);

@@ -13,6 +13,7 @@ needs_of() {
         papers | faults) echo core report sim ghdl c++ ghdl5 ;;
         timeline) echo core report sim ghdl ;;
         generate | registers | package) echo core report package ;;
+        rough) echo core run ;;
         blind) echo run blind fleet ;;
         fleet) echo run fleet ;;
         sensitivity | mishaps) echo run fleet ;;

@@ -22,7 +22,7 @@ from fluxproof.plant import sensor_params
 from fluxproof.plant.sensors import current_code, position_code, u_dc_code
 from golden_model import clocked, fluxproof
 from golden_model import drive as drives
-from golden_model.io.fault_latch import LATE, NAMES
+from golden_model.io.fault_latch import ENCODER, LATE, NAMES
 from golden_model.registers import registers
 from golden_model.units import from_si
 
@@ -151,6 +151,8 @@ class Pair:
             self.decided = (late, None)
         elif entered and self.golden.observed.sample_trip:
             self.decided = (begin + clocked.CHECKS_CLOCKS - 1, begin)
+        elif entered and self.golden.observed.encoder_lost and not self.golden.registers.fault_ignore >> ENCODER & 1:
+            self.decided = (begin + clocked.DUE["emf"][0], begin)
 
     def compare_values(self) -> None:
         """``==`` on every value of the last sample, once they are valid."""

@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The situations: a row each, with the drives and speeds it is tried on; a new one is a function and a row of TABLE.
+
+A situation takes a drive and a part of the rated speed, and returns (what was seen, whether it is what is wanted).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+from fluxproof.checkout import DRIVES
+from golden_model.drive import Drive, load, with_carrier
+from golden_model.drive_keys import needed
+from studies.rough.board import RoughBoard
+
+CARRIER_HALF = 250
+PEAK, WRONG_WAY_DEG = 1.5, 10.0  # of the current limit; of the shaft against the direction
+BEFORE_INDEX, LOADING = 0.1, 40  # rad of the shaft; periods in which the registers are loaded
+EDGES, ABSOLUTE = ("servo_24v",), ("drone_24v", "spindle_400v", "paper001", "emrax228")
+HALLS = ("hub_36v",)
+SPEEDS = (0.03, 0.1, 0.3, 0.8)
+ALLOWED_S = {0.03: 0.05, 0.1: 0.005, 0.3: 0.005, 0.8: 0.005}  # until a lost encoder is named
+HALL_ALLOWED_S = 0.1  # an edge tells the speed
+
+
+class Situation(NamedTuple):
+    """A row: its name, what is wanted in words, the drives, the parts of the rated speed, the function."""
+
+    name: str
+    wanted: str
+    drives: tuple[str, ...]
+    speeds: tuple[float, ...]
+    play: Callable[[Drive, float], tuple[str, bool]]
+
+
+def drive_of(name: str, passes: int = 1) -> Drive:
+    """The drive file at a slow clock; its index is believed at the first pass unless the situation is about that."""
+    drive = load(DRIVES / f"{name}.toml")
+    if drive.machine.inertia_kgm2 <= 0.0:
+        drive = replace(drive, machine=replace(drive.machine, inertia_kgm2=1e-2))
+    drive = with_carrier(drive, CARRIER_HALF)
+    return replace(drive, encoder=replace(drive.encoder, index_passes=passes)) if drive.encoder.kind == "abz" else drive
+
+
+def verdict(board: RoughBoard, names: tuple[str, ...], within_s: float | None = None, since: int = 0):
+    """(seen, good): a fault of these names, in time, below the peak, and not far the wrong way."""
+    took = None if board.fault_period is None else (board.fault_period - since + 1) * board.drive.sample_time_s
+    peak, back = board.peak_a / board.drive.current_limit_a, -math.degrees(board.farthest[0])
+    good = bool(set(board.faults) & set(names)) and board.tripped and peak < PEAK and back < WRONG_WAY_DEG
+    good = good and (within_s is None or (took is not None and took <= within_s))
+    named = ", ".join(board.faults) or "no fault"
+    late = "" if took is None or within_s is None else f" after {took * 1e3:.1f} ms"
+    return f"{named}{late}, peak {peak:.2f} of the limit, {board.gates_on} clocks with gates on", good
+
+
+def running(drive: Drive, part: float) -> RoughBoard:
+    """A healthy drive in speed mode at a part of the rated speed, the shaft turning through its index before."""
+    omega = max(part, SPEEDS[0]) * drive.machine.rated_speed_rad_s
+    before = BEFORE_INDEX + omega * LOADING * drive.sample_time_s
+    board = RoughBoard(drive, theta_m=-before, omega_m=omega)
+    board.run(LOADING + round(1.5 * BEFORE_INDEX / omega / drive.sample_time_s), clear_encoder=1)
+    turns = drive.machine.pole_pairs * before / (2 * math.pi)
+    board.run(3, theta_offset=round(turns * 2**18) % 2**18, speed_mode=1, omega_ref=board.speed(part))
+    board.run_s(0.02, enable=1)
+    board.farthest = [0.0, 0.0]
+    return board
+
+
+def healthy(drive: Drive, part: float) -> tuple[str, bool]:
+    board = running(drive, part)
+    board.run_s(0.05)
+    return f"{', '.join(board.faults) or 'no fault'}, {board.gates_on} clocks with gates on", not board.faults
+
+
+def before_the_index(drive: Drive, _part: float) -> tuple[str, bool]:
+    board = RoughBoard(drive, theta_m=-BEFORE_INDEX)
+    board.run(80, speed_mode=1, omega_ref=board.speed(0.1))
+    board.run_s(0.02, enable=1)
+    seen, good = verdict(board, ("no_index",))
+    return seen, good and board.gates_on == 0
+
+
+def stuck_z(level: int):
+    def play(drive: Drive, _part: float) -> tuple[str, bool]:
+        omega = 0.3 * drive.machine.rated_speed_rad_s
+        board = RoughBoard(drive, theta_m=-BEFORE_INDEX, omega_m=omega)
+        board.spoil = lambda pins, board: pins["pin_z"].__setitem__(slice(None), level)
+        board.run(round(2.2 * 2 * math.pi / omega / drive.sample_time_s))
+        board.run_s(0.005, enable=1)
+        seen, good = verdict(board, ("no_index",))
+        return seen, good and board.gates_on == 0
+
+    return play
+
+
+def spike(drive: Drive, _part: float) -> tuple[str, bool]:
+    """A pulse of 300 ns on Z at rest, in the phase of the index."""
+    board = RoughBoard(drive, theta_m=100.3 / needed(drive.encoder.counts) * 2 * math.pi)
+    clocks = max(round(300e-9 * board.clock_hz), 5)
+
+    def spoil(pins, board):
+        if board.period == 40:
+            pins["pin_z"][100 : 100 + clocks] = 1
+
+    board.spoil = spoil
+    board.run(60)
+    board.run_s(0.005, enable=1)
+    seen, good = verdict(board, ("no_index",))
+    return seen, good and board.gates_on == 0
+
+
+def index_twice(drive: Drive, _part: float) -> tuple[str, bool]:
+    """Two turns by hand, then enabled."""
+    omega = 0.5 * drive.machine.rated_speed_rad_s
+    board = RoughBoard(drive, theta_m=-BEFORE_INDEX, omega_m=omega)
+    board.run(round(1.3 * 2 * math.pi / omega / drive.sample_time_s))
+    offset = drive.machine.pole_pairs * BEFORE_INDEX / (2 * math.pi) * 2**18
+    board.run(4, theta_offset=round(offset) % 2**18, speed_mode=1, omega_ref=board.speed(0.5))
+    board.run_s(0.02, enable=1)
+    return f"{', '.join(board.faults) or 'no fault'}, referenced {board.referenced}", (
+        board.referenced and not board.faults and board.gates_on > 0
+    )
+
+
+def held(board: RoughBoard) -> None:
+    """From the next period on the encoder shows what it shows now."""
+    kept: dict[str, int] = {}
+
+    def spoil(pins, _board):
+        for name in ("pin_a", "pin_b", "pin_z", "hall_a", "hall_b", "hall_c", "position_in"):
+            kept.setdefault(name, int(pins[name][0]))
+            pins[name][:] = kept[name]
+
+    board.spoil = spoil
+
+
+def dead(board: RoughBoard) -> None:
+    """From the next period on all lines are 0."""
+
+    def spoil(pins, _board):
+        for name in ("pin_a", "pin_b", "pin_z"):
+            pins[name][:] = 0
+
+    board.spoil = spoil
+
+
+def lost(how: Callable[[RoughBoard], None], names: tuple[str, ...]):
+    def play(drive: Drive, part: float) -> tuple[str, bool]:
+        board = running(drive, part)
+        if board.faults:
+            return f"{', '.join(board.faults)} before the encoder is lost", False
+        since = board.period
+        how(board)
+        board.until_off(0.15)
+        allowed = HALL_ALLOWED_S if drive.encoder.kind == "hall" else ALLOWED_S[part]
+        board.farthest[0] = 0.0  # at this speed nothing turns the wrong way
+        return verdict(board, names, allowed, since)
+
+    return play
+
+
+def hall_levels(levels: tuple[int | None, ...], enabled: bool):
+    """Levels of the three lines, None: as the sensor shows it; from before the enable on, or while it runs."""
+
+    def play(drive: Drive, part: float) -> tuple[str, bool]:
+        def spoil(pins, _board):
+            for x, level in zip("abc", levels, strict=True):
+                if level is not None:
+                    pins[f"hall_{x}"][:] = level
+
+        if enabled:
+            board = running(drive, part)
+            if board.faults:
+                return f"{', '.join(board.faults)} before", False
+            board.spoil = spoil
+            board.until_off(0.3)
+            board.farthest[0] = 0.0
+            return verdict(board, ("hall_code", "position"))
+        board = RoughBoard(drive)
+        board.spoil = spoil
+        board.run(80)
+        board.run_s(0.005, enable=1)
+        seen, good = verdict(board, ("hall_code",))
+        return seen, good and board.gates_on == 0
+
+    return play
+
+
+def trip_and_clear(drive: Drive, _part: float) -> tuple[str, bool]:
+    """Tripped by the pin; then a pulse at each of 12 clocks from the begin of a write of clear_trip on."""
+    board = running(drive, 0.0)
+    ran = bool(board.golden.state.wires.running)
+    unseen = 0
+    for at in range(12):
+        board.spoil = lambda pins, board: pins["trip"].__setitem__(slice(300, 301), 1)
+        board.run(1)
+        board.spoil = lambda pins, board, at=at: pins["trip"].__setitem__(slice(at, at + 1), 1)
+        board.run(1, clear_trip=1)
+        board.spoil = lambda pins, board: None
+        board.run(2)
+        unseen += not board.tripped
+    board.run(4, clear_trip=1)
+    return f"{unseen} of 12 trips cleared unseen", ran and unseen == 0 and not board.tripped
+
+
+ALL = (*EDGES, *HALLS, *ABSOLUTE)
+LOST, NAMED = ("encoder_lost", "position"), "encoder_lost or position in 5 ms, in 50 ms at 3 %"
+TABLE = (
+    Situation("healthy", "no fault", ALL, (0.0, *SPEEDS), healthy),
+    Situation("enabled before the index", "no_index, gates never on", EDGES, (0.0,), before_the_index),
+    Situation("index dead, two turns by hand", "no_index, gates never on", EDGES, (0.3,), stuck_z(0)),
+    Situation("Z stuck at 1, two turns by hand", "no_index, gates never on", EDGES, (0.3,), stuck_z(1)),
+    Situation("spike of 300 ns on Z at rest", "no_index, gates never on", EDGES, (0.0,), spike),
+    Situation("index met twice", "runs", EDGES, (0.5,), index_twice),
+    Situation("A and B frozen", NAMED, EDGES, SPEEDS, lost(held, LOST)),
+    Situation("all lines of A/B/Z dead", NAMED, EDGES, SPEEDS, lost(dead, LOST)),
+    Situation("code frozen", NAMED, ABSOLUTE, SPEEDS, lost(held, LOST)),
+    Situation("Hall sensors frozen", "encoder_lost in 100 ms", HALLS, (0.3, 0.8), lost(held, ("encoder_lost",))),
+    Situation("Hall code 111 at the enable", "hall_code, gates never on", HALLS, (0.0,), hall_levels((1, 1, 1), False)),
+    Situation("Hall code 000 at the enable", "hall_code, gates never on", HALLS, (0.0,), hall_levels((0, 0, 0), False)),
+    Situation("Hall code 111", "hall_code", HALLS, (0.0, 0.25, 0.8), hall_levels((1, 1, 1), True)),
+    Situation("one Hall sensor at 0", "hall_code", HALLS, (0.25, 0.8), hall_levels((0, None, None), True)),
+    Situation("one Hall sensor at 1", "hall_code", HALLS, (0.25, 0.8), hall_levels((None, 1, None), True)),
+    Situation("a trip at a write of clear_trip", "stays off", ("servo_24v", "spindle_400v"), (0.0,), trip_and_clear),
+)
+PASSES = {"enabled before the index": 2, "index dead, two turns by hand": 2, "Z stuck at 1, two turns by hand": 2,
+          "spike of 300 ns on Z at rest": 2, "index met twice": 2}  # fmt: skip
