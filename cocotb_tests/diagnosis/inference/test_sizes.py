@@ -23,7 +23,7 @@ def test_absurd_sizes_are_impossible():
     assert not possible(alone)
 
 
-@pytest.mark.parametrize("share, costs", [(0.95, False), (0.5, True)])
+@pytest.mark.parametrize("share, costs", [(0.95, False), (0.6, False), (0.4, True)])
 def test_an_implausible_value_costs(share, costs, monkeypatch):
     """Else a sum of absurd effects that cancel is preferred to the true ones."""
     view = slow_view(log(Truth(psi_m=share * PSI), levels=LEVELS[:8]), NOMINAL)
