@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 from golden_model.drive_checks import check
 from golden_model.drive_file import read_sections
-from golden_model.drive_keys import DriveError, flag, not_negative, positive, real, trim, whole
+from golden_model.drive_keys import DriveError, flag, needed, not_negative, positive, real, trim, whole
 from golden_model.front_ends import Converters, Encoder
 from golden_model.supply import Supply
 
@@ -71,7 +71,7 @@ class Inverter:
     @property
     def on_time_s(self):
         """Shortest time that a switch is on."""
-        return self.leg_pulse_s - self.dead_time_s if self.min_on_time_s is None else self.min_on_time_s
+        return needed(self.min_pulse_s) - self.dead_time_s if self.min_on_time_s is None else self.min_on_time_s
 
 
 @dataclass(frozen=True)
