@@ -105,7 +105,8 @@ def _decision(recordings, nominal, progress, shifts) -> Decision:
     decision = conclude(posterior, held)
     if decision.verdict == "no_mismatch":
         return decision
-    readings, rivals, read = preferred(recordings, posterior, decision.verdict != "unexplained", progress)
+    whole = decision.verdict in ("explained", "ambiguous")  # a part is no reason against a reading that explains all
+    readings, rivals, read = preferred(recordings, posterior, whole, progress)
     if not readings:
         return decision
     return under(readings, rivals, decision, conclude(read, held), voltage_rms(view))
