@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Self-saturation: psi_d = f(i_d), psi_q = g(i_q), g odd; the curves are free."""
 
+import itertools
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from fluxproof.diagnosis.effects import LEAST_CURRENT, BentFlux, Parameter
+from fluxproof.diagnosis.effects import DOUBT, LEAST_CURRENT, BentFlux, Parameter
 from fluxproof.diagnosis.ground.result import Estimate
 
 
@@ -25,6 +26,7 @@ TERMS = {
     "d_3": Term("d", lambda x: x * x**2),
     "q_5": Term("q", lambda y: y * (y**2) ** 2),
 }
+CURRENTS = (-1.0, -0.5, 0.5, 1.0)  # of rated: where a flux linkage must have the sign of its current
 FORMULA, FURTHER = ("q_3", "d_3"), ("q_2", "q_5", "d_2", "d_2s")
 
 
@@ -77,6 +79,15 @@ class Saturation(BentFlux):
             curve = sum((value * TERMS[key].shape(x) for key, value in _of(axis, c).items()), np.zeros_like(x))
             bends.append(np.max(np.abs(curve - x * curve[-1])))
         return float(max(bends))
+
+    def possible(self, c, covariance, nominal):
+        """No saturation reverses the flux linkage that a current makes: an inductance is never negative."""
+        values = np.array(list(c.values()))
+        for axis, share in itertools.product("qd", CURRENTS):
+            weights = np.array([TERMS[key].shape(share) if TERMS[key].axis == axis else 0.0 for key in c])
+            if np.sign(share) * (share + weights @ values) < -DOUBT * np.sqrt(max(weights @ covariance @ weights, 0.0)):
+                return False
+        return True
 
     def estimates(self, c, covariance, nominal):
         out = {}

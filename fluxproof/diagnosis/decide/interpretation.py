@@ -7,6 +7,7 @@ and replaces effects (``is_exact``, ``is_simpler``), and it is asserted if it ex
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from fluxproof.diagnosis.decide.decision import Decision
@@ -39,8 +40,7 @@ def is_simpler(readings, left, most, absurd) -> bool:
 def under(readings, rivals, documented: Decision, found: Decision, level: float) -> Decision:
     """``found``, decided with the readings, as a decision on the recording as it is; level: rms of its voltage [V].
 
-    ``documented`` if nothing is explained with them: they must explain half of the misfit and of the voltage, as a
-    recording in other units leaves a misfit that is nearly all of the simulation's voltage.
+    ``documented`` if they explain less than half of the misfit, or so little of it that what is left may imitate them.
     Voltages are those of the recording: where the bus is recorded at half, the residual is given in recorded volts.
     readings: tuple of Reading; rivals: list of those that fit as well as the only one.  documented: the decision
     without readings, for the misfit before.
@@ -51,7 +51,7 @@ def under(readings, rivals, documented: Decision, found: Decision, level: float)
     fit = _fit(documented.fit, found.fit, volts)
     remainder = tuple(_recorded(part, volts) for part in found.remainder)
     kind = kind_as_interpreted(found.verdict, fit.explained_share, remainder)
-    if kind == "unexplained" or fit.holdout_after**2 > k.HALF * level**2:
+    if kind == "unexplained" or _imitated(fit, level) > k.DOUBTED:
         return replace(documented, hinted=readings)
     return replace(
         found,
@@ -65,6 +65,17 @@ def under(readings, rivals, documented: Decision, found: Decision, level: float)
         readings=readings,
         evidence=_evidence(documented.evidence, found.evidence, volts),
     )
+
+
+def _imitated(fit: Fit, level: float) -> float:
+    """The probability that something unknown, of which much is left, imitates an interpretation (credibility.py).
+
+    A recording in other units leaves a misfit that is nearly all of the simulation's voltage: no more than the recorded
+    ``level`` counts as explained.  Two factors that left 14 of 42 V were told of a mirrored frame, which is neither.
+    """
+    left2 = max(fit.holdout_after**2 - fit.noise_floor**2, 0.0)
+    explained2 = max(min(fit.holdout_before, level) ** 2 - fit.holdout_after**2, 0.0)
+    return math.exp(-explained2 / (2.0 * k.IMITATION**2 * left2)) if left2 else 0.0
 
 
 def restated(decision: Decision, changed) -> Decision:
