@@ -19,6 +19,7 @@ from fluxproof.diagnosis.decide.decision import Decision
 from fluxproof.diagnosis.decide.interpretation import restated, under
 from fluxproof.diagnosis.decide.one_point import conclude_one_point
 from fluxproof.diagnosis.decide.rules import not_compared
+from fluxproof.diagnosis.decide.verdict import WHOLE
 from fluxproof.diagnosis.ground.nominal import Nominal
 from fluxproof.diagnosis.ground.recording import Problem, Recording
 from fluxproof.diagnosis.inference.linearise import Rows
@@ -105,7 +106,7 @@ def _decision(recordings, nominal, progress, shifts) -> Decision:
     decision = conclude(posterior, held)
     if decision.verdict == "no_mismatch":
         return decision
-    whole = decision.verdict in ("explained", "ambiguous")  # a part is no reason against a reading that explains all
+    whole = decision.verdict in WHOLE  # a part is no reason against a reading that explains all
     readings, rivals, read = preferred(recordings, posterior, whole, progress)
     if not readings:
         return decision

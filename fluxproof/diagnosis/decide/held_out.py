@@ -26,7 +26,10 @@ def without_idle(posterior, held):
         idle = dict.fromkeys(worse, HELD_OUT) or dict.fromkeys(sizeless(names, posterior), SIZELESS)
         if not idle:
             return posterior
-        posterior = within(posterior, {n for _, fit in names.fits for n in fit.names} - idle.keys(), idle)
+        # A drift without a size may have stood for a constant, which is in none of the probable sets beside it.
+        sets = [fit.names for _, fit in names.fits] if worse else posterior.fits
+        others = {n for effects in sets for n in effects}
+        posterior = within(posterior, others - idle.keys(), idle)
 
 
 def helps(posterior, name, held) -> bool:

@@ -19,14 +19,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fluxproof.diagnosis.decide.credibility import credibilities
 from fluxproof.diagnosis.decide.decision import Decision
 from fluxproof.diagnosis.decide.held_out import without_idle
 from fluxproof.diagnosis.decide.names import Names, names_of
 from fluxproof.diagnosis.decide.off_orders import Stray, row_residual, stray_order, stray_swing, stray_torque
 from fluxproof.diagnosis.decide.relevant import relevant_names
 from fluxproof.diagnosis.decide.sizes import Sizes, left_by, measured_torque
-from fluxproof.diagnosis.decide.verdict import at_floor, is_usual, kind_of
+from fluxproof.diagnosis.decide.verdict import at_floor, is_usual, kind_of, without_imitations
 from fluxproof.diagnosis.effects import ShaftTorque
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.posterior import Posterior
@@ -67,7 +66,7 @@ def judge(posterior, held) -> Judgement:
     channel = train.primary()
     share = unseen.share(channel) if _is_counted(explaining, setup) else None
     kind = kind_of(names, train, unseen, channel, share, stray)
-    kind = _without_imitations(kind, names, best)
+    kind = without_imitations(kind, names, best)
     asserted = _beside_unknown(names, kind)
     return Judgement(searched, posterior, kind, asserted, names, explaining, channel, share, stray, train, unseen)
 
@@ -123,18 +122,6 @@ def _as_noise(posterior, names, stray, held) -> Names:
     shaft = {n for n, effect in setup.effects.items() if isinstance(effect, ShaftTorque)}
     hidden = setup.view.turns_freely.any() or not measured_torque(setup)
     return names.withheld(frozenset(shaft if hidden else ()))
-
-
-def _without_imitations(kind, names, best) -> str:
-    """The kind of a verdict where much is left: if that may imitate every name (credibility.py), nothing is explained.
-
-    A sudden loss of flux, without an effect for it, was half explained by gains of currents and bus.
-    """
-    if kind != "partly_explained" or not names.asserted & set(best.names):
-        return kind
-    real = credibilities(best)
-    sure = any(real[n] >= 1.0 - k.DOUBTED for n in names.asserted & set(best.names))
-    return kind if sure else "unexplained"
 
 
 def _beside_unknown(names, kind) -> Names:

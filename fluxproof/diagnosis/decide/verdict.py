@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+from fluxproof.diagnosis.decide.credibility import credibilities
 from fluxproof.diagnosis.ground import constants as k
+
+WHOLE = ("explained", "ambiguous")  # verdicts on what was found of a misfit that it explains
 
 
 def kind_of(names, train, held, channel, share, stray) -> str:
@@ -18,6 +21,18 @@ def kind_of(names, train, held, channel, share, stray) -> str:
     if stray or not _is_whole(held, {c: held.share(c) for c in held.channels} | {channel: share}):
         return "partly_explained" if share is not None and share >= k.HALF else "unexplained"
     return "ambiguous" if names.ambiguous else "explained"
+
+
+def without_imitations(kind, names, best) -> str:
+    """The kind of a verdict where much is left: if that may imitate every name (credibility.py), nothing is explained.
+
+    A sudden loss of flux, without an effect for it, was half explained by gains of currents and bus.
+    """
+    if kind != "partly_explained" or not names.asserted & set(best.names):
+        return kind
+    real = credibilities(best)
+    sure = any(real[n] >= 1.0 - k.DOUBTED for n in names.asserted & set(best.names))
+    return kind if sure else "unexplained"
 
 
 def kind_of_one_point(names, groups, left_over, quiet) -> str:

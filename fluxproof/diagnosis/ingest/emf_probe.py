@@ -20,6 +20,7 @@ import numpy as np
 
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.ingest.demand import LINE_VOLTAGES, PHASE_VOLTAGES
+from fluxproof.plant.transforms import AXES
 
 LEAST_PER_TURN = 2.5  # samples of an electrical turn: at two the amplitude and the phase cannot be told apart
 TURNS = 8  # of a window in which the shape is fitted
@@ -54,8 +55,10 @@ def from_fit(path, columns: dict, pieces: list[tuple[int, int]]) -> tuple[dict, 
     names = LINE_VOLTAGES if found[0] in LINE_VOLTAGES else PHASE_VOLTAGES
     backward = "omega_e" in columns and float(np.nanmedian(columns["omega_e"])) < 0.0
     parts, per_turn = [], []
-    stretches = [(a + c, a + d) for a, b in pieces for c, d in _turning(columns[found[0]][a:b])]
-    for a, b in stretches:
+    first = columns[found[0]]
+    stretches = [(a + c, a + d) for a, b in pieces for c, d in _turning(first[a:b])]
+    runs = [(a + c, a + d) for a, b in stretches for c, d in _steady(columns["t"][a:b], first[a:b], ORDERS[names])]
+    for a, b in runs:
         t, u = columns["t"][a:b], np.stack([columns[name][a:b] for name in found])
         phi = _phase(t, u[0] - u[0].mean())
         if phi is None or phi[-1] - phi[0] < 2 * np.pi * SHORTEST:
@@ -92,6 +95,23 @@ def _turning(u) -> list[tuple[int, int]]:
     loud = np.concatenate([[False], power > QUIET**2 * power.max(), [False]])
     begins, ends = np.flatnonzero(loud[1:] & ~loud[:-1]), np.flatnonzero(~loud[1:] & loud[:-1])
     return [(a, b) for a, b in zip(begins, ends, strict=True) if b - a >= SEGMENT]
+
+
+def _steady(t, u, orders) -> list[tuple[int, int]]:
+    """(begin, end) of the runs of windows that a fit describes: a jump of the speed spoils the phase on both sides."""
+    phi = _phase(t, u - u.mean())
+    if phi is None or phi[-1] - phi[0] < 2 * np.pi * SHORTEST:
+        return [(0, len(t))]
+    omega, windows = np.gradient(phi, t), _windows(phi, TURNS)
+    left = np.array([_fit(phi[a:b], omega[a:b], u[a:b], orders)[1] for a, b in windows])
+    good = np.concatenate([[False], _described(left), [False]])
+    begins, ends = np.flatnonzero(good[1:] & ~good[:-1]), np.flatnonzero(~good[1:] & good[:-1])
+    return [(windows[a][0], windows[b - 1][1]) for a, b in zip(begins, ends, strict=True)] or [(0, len(t))]
+
+
+def _described(left) -> np.ndarray:
+    """Whether windows whose fits leave the share ``left`` (w,) of the voltage are no worse than usual, (w,) bool."""
+    return left <= max(POOR * float(np.median(left)), LEAST_LEFT)
 
 
 def _phase(t, u) -> np.ndarray | None:
@@ -146,13 +166,13 @@ def _made(t, u, phi, orders, places, backward: bool):
     step = min(float(np.median(np.diff(t))), 2 * np.pi / DENSE / float(omega.max()))
     at = t[0] + step * np.arange(int((t[-1] - t[0]) / step) + 1)
     angle, fast = np.interp(at, t, phi), np.interp(at, t, omega)
-    third = 2 * np.pi / 3 * (-1 if backward else 1)
+    third = float(np.angle(AXES[1])) * (-1 if backward else 1)
     windows = _windows(phi, TURNS)
     fits = [[_fit(phi[a:b], omega[a:b], one[a:b], orders) for one in u] for a, b in windows]
     left = np.array([max(rest for _, rest in window) for window in fits])
     if np.median(left) > LEFT:
         return None
-    good = left <= max(POOR * float(np.median(left)), LEAST_LEFT)
+    good = _described(left)
     out = np.full((3, len(at)), np.nan)
     for (a, b), window in zip(compress(windows, good), compress(fits, good), strict=True):
         inside = (at >= t[a]) & ((at < t[b]) if b < len(t) else True)
