@@ -14,6 +14,7 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.shaft import measures_torque
 from fluxproof.diagnosis.decide.ambiguity import ambiguities
+from fluxproof.diagnosis.decide.credibility import credibilities
 from fluxproof.diagnosis.decide.estimates import estimates_in
 from fluxproof.diagnosis.effects.constant import Constant
 from fluxproof.diagnosis.effects.drive_file import Restates
@@ -65,7 +66,7 @@ def names_of(posterior) -> Names:
     present = {n: p for n, p in posterior.present().items() if n in seen}
     sure = {n: p for n, p in present.items() if p >= 1.0 - k.DOUBTED and n in best.names}
     named = {n: p for n, p in sure.items() if effects[n].named}
-    suspects = {n: p for n, p in sure.items() if not effects[n].named}
+    suspects = _no_imitations({n: p for n, p in sure.items() if not effects[n].named}, best)
     groups = tuple(_with_what_depends(g, named, kept) for g in ambiguities(kept, present, sure, effects))
     twins = [n for n in named if _has_a_twin(n, effects, groups)]
     if twins and not measures_torque(posterior.setup.view):  # which a wrong current changes, and a wrong nameplate not
@@ -77,6 +78,15 @@ def names_of(posterior) -> Names:
     grouped = {n for g in groups for n in g}
     possible = {n: p for n, p in present.items() if n not in sure and n not in grouped and p >= k.PRESENT}
     return Names(named, groups, possible, suspects, tuple(kept))
+
+
+def _no_imitations(suspects, fit) -> dict[str, float]:
+    """The suspects that no remainder may imitate (credibility.py): of a cause that no formula has, any is a guess.
+
+    A second harmonic of the EMF, which the catalogue does not have, was told as a resolver with unequal signals.
+    """
+    real = credibilities(fit) if suspects else {}
+    return {n: p for n, p in suspects.items() if real[n] >= 1.0 - k.DOUBTED}
 
 
 def _has_a_twin(name, effects, groups) -> bool:
