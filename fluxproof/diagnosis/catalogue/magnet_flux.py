@@ -20,11 +20,11 @@ class MagnetFlux(FluxEffect, Constant, Spread):
         return {"recovery": np.ones_like(view.i) * course(view)}
 
     def possible(self, c, covariance, nominal):
-        """Lost flux may recover, but not fall further: that is a warming magnet."""
+        """Lost flux may recover, but not fall further: that is a warming magnet, unless it is too little to matter."""
         key, lost = "recovery", c["delta_psi_m"]
         if not c.get(key):
             return True
-        return c[key] * np.sign(lost) <= DOUBT * sigma(covariance, list(c).index(key))
+        return c[key] * np.sign(lost) <= DOUBT * sigma(covariance, list(c).index(key)) + self.floor(nominal)
 
     def floor(self, nominal):
         return 0.003 * nominal.machine.magnet_flux_wb
