@@ -37,7 +37,9 @@ def test_every_hidden_difference_is_named_with_its_size(answer):
     assert answer["verdict"] == "explained" and others == []
     assert [row.hidden.effect for row in rows] == ["dead_time", "magnet_flux", "encoder_offset"]
     assert max(row.deviation for row in rows) < 3.0
-    for row in rows:  # a wide interval would hold the truth too; a resistance may take a part of the dead time's voltage
+    for (
+        row
+    ) in rows:  # a wide interval would hold the truth too; a resistance may take a part of the dead time's voltage
         assert row.sigma < (0.2 if row.hidden.effect == "dead_time" else 0.06) * abs(row.hidden.value)
     fit = answer["fit"]
     assert fit["holdout_before"] > 10.0 and fit["holdout_after"] < 2.0 * fit["noise_floor"] < 1.0
