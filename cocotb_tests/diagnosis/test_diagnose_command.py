@@ -112,7 +112,7 @@ def test_the_improved_drive_is_one_that_registers_takes(explained, capsys):
     assert load_nominal(path).machine.magnet_flux_wb == pytest.approx(FLUX, rel=2e-3)
     before, after = registers(bench.DRIVE).values, registers(drives.load(path)).values
     changed = {name for name in before._fields if getattr(before, name) != getattr(after, name)}
-    assert "lambda_mg" in changed and not changed - {"lambda_mg", "delta_max", "speed_kp", "speed_ki"}, changed
+    assert "lambda_mg" in changed and not changed - {"lambda_mg", "delta_max", "speed_kp", "speed_ki", "emf_min", "emf_w"}, changed
     assert fluxproof.main(["registers", str(path)]) == 0 and "lambda_mg" in capsys.readouterr().out
 
 
@@ -211,12 +211,12 @@ def test_every_file_that_was_written_is_listed(tmp_path, capsys):
 
 
 def test_a_bad_recording_is_a_verdict(tmp_path, capsys):
-    path = table_of(tmp_path / "stopped.csv", t=np.zeros(len(bench.columns(SHORT)["t"])))
+    path = table_of(tmp_path / "stopped.csv", theta_e=np.ones(len(bench.columns(SHORT)["t"])))
     assert diagnose(tmp_path / "out", path) == 0
     data = answer(tmp_path / "out")
     assert data["verdict"] == "bad_recording" and data["effects"] == []
     assert any(p["fatal"] for p in data["recording"]["problems"])
-    assert "time does not advance" in capsys.readouterr().out.splitlines()[0]
+    assert "The recording cannot be used: column theta_e" in capsys.readouterr().out.splitlines()[0]
 
 
 @pytest.mark.slow

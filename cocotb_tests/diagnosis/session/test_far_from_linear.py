@@ -30,7 +30,8 @@ def test_a_scale_of_the_currents_may_be_one_of_the_constants(factor, tmp_path):
     """R, L_d and L_q, each by the same factor, leave the same voltages: only another instrument decides."""
     answer = answer_to(Mistake("", scaled(PHASES, factor)), tmp_path)
     assert answer.verdict == "ambiguous" and not answer.conventions and not answer.effects, answer.sentence
-    assert answer.ambiguity == (("current_scale", "machine_scale"),), answer.sentence
+    (group,) = answer.ambiguity  # with a resistance beside a scale, as a drive file may be off by a third there
+    assert {"current_scale", "machine_scale"} <= set(group) <= {"current_scale", "machine_scale", "resistance"}
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.result import BestFit, NamedEffect
 
 AGAINST = {
-    HELD_OUT: "it predicts the held-out operating points worse than without",
+    HELD_OUT: "held-out points are worse with it",
     SIZELESS: "its size is compatible with zero",
 }
 
