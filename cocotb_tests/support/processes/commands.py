@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from cocotb_tests.support.drives import PAPER
@@ -15,10 +14,10 @@ STOPPED = "fluxproof: stopped\n"
 
 
 def write_inputs(folder: Path) -> Path:
-    """A folder with drive.toml, two recordings whose time stands still, and a good one."""
+    """A folder with drive.toml, two recordings whose angle stands still, and a good one."""
     (folder / "drive.toml").write_bytes(PAPER.read_bytes())
     table = pd.DataFrame({name: values[:900] for name, values in bench.columns(bench.GRID[:4]).items()})
     table.to_csv(folder / "good.csv", index=False)
-    table.assign(t=np.zeros(len(table))).to_csv(folder / "stopped.csv", index=False)
-    table.assign(t=np.ones(len(table))).to_csv(folder / "stopped_too.csv", index=False)
+    table.assign(theta_e=0.5).to_csv(folder / "stopped.csv", index=False)
+    table.assign(theta_e=1.0).to_csv(folder / "stopped_too.csv", index=False)
     return folder
