@@ -58,3 +58,13 @@ def test_rows_without_torque_under_current_are_a_lost_angle(tmp_path):
     (lost,) = [p for p in answer.problems if p.code == "torque_lost"]
     assert (lost.row, lost.count, lost.action) == (len(columns["i_q"]), 2, "rows not used")
     assert "the angle was lost" in answer.details
+
+
+def test_an_unexplained_torque_has_a_best_fit_in_its_own_unit(tmp_path):
+    """The residual of a best fit was that of the voltage: zero of a dyno sheet, which then had no best fit."""
+    columns = sheet(psi=0.9)
+    columns["torque"] = columns["torque"] + 0.6 * np.sin(3.0 * columns["i_q"]) * np.sign(columns["omega_e"])
+    answer = answer_of(tmp_path, columns)
+    assert answer.verdict == "unexplained" and not answer.effects, answer.sentence
+    assert answer.best_fit is not None and 0.0 < answer.best_fit.left < answer.fit.holdout_before
+    assert "N m there" in answer.details or "Nm there" in answer.details, answer.details

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How credible an effect is: the probability that it is real, and no imitation by something unknown.
 
-A fleet counts a set by it (fleet/rates.py), and so does a verdict on a misfit of which much is left (rules.py).  Where
-much of the misfit is left, something unknown is at work, and a part of it may look like an effect: a residual of the
-rms D, lying along the columns of an effect whose contribution has the rms A, would imitate it with the probability
+A fleet counts a set by it (fleet/rates.py), and so does a verdict on a misfit of which much is left (verdict.py).
+Where much of the misfit is left, something unknown is at work, and a part of it may look like an effect: a residual of
+the rms D, lying along the columns of an effect whose contribution has the rms A, would imitate it with the probability
 exp(-(A / D)^2 / 8).  An effect twice as large as what is left may still be an imitation, and one five times as large is
 not.  The rules below say how much of the residual counts in D, each with the case that needs it.
 """

@@ -34,9 +34,10 @@ def likeliest(searched, idle, held) -> BestFit | None:
 
 
 def _left(setup, y, held) -> float:
-    """rms of a misfit (r,) at held-out points, of the voltage where it was compared."""
-    channels = Sizes(setup, setup.cells.y, y, held, measured_torque(setup)).channels
-    return channels["u"].after if "u" in channels else 0.0
+    """rms of a misfit (r,) at held-out points, of the voltage or of the torque where no voltage was recorded."""
+    sizes = Sizes(setup, setup.cells.y, y, held, measured_torque(setup))
+    found = sizes.channels.get(sizes.compared())
+    return found.after if found else 0.0
 
 
 def _against(p, fit, idle, share) -> str:

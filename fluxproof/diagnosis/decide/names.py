@@ -2,7 +2,8 @@
 """Which effects are named, which are ambiguous, and with what confidence.
 
 The confidence in a name is the probability of its presence, the sum over all sets that contain it.  What no model has
-is in the marginal likelihood of every set: no rule beyond it asks whether a remainder imitates an effect.
+is in the marginal likelihood of every set.  Only where much is left is it asked whether that may imitate what was found
+(credibility.py): of a partly explained misfit (verdict.py), of a suspect, of an interpretation (interpretation.py).
 """
 
 from __future__ import annotations

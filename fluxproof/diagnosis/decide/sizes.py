@@ -77,6 +77,10 @@ class Sizes:
             self.channels, key=lambda c: self.channels[c].before / max(self.channels[c].floor, 1e-300), default="u"
         )
 
+    def compared(self) -> str:
+        """The channel in whose unit a fit is told: the voltage, or the torque where no voltage was recorded."""
+        return "torque" if "torque" in self.channels and "u" not in self.channels else "u"
+
     def share(self, channel, orders=None) -> float | None:
         """Share of a channel's power above the floor that was explained, in some or all of its orders."""
         mine = [s for (c, h), s in self.orders.items() if c == channel and (orders is None or h in orders)]
@@ -110,7 +114,7 @@ def left_by(fit, effects) -> np.ndarray:
 
 def fit_of(train: Sizes, held: Sizes) -> Fit:
     """The misfit of the voltage, or of the torque where none was recorded, on fitted and on held-out blocks."""
-    channel = "torque" if "torque" in train.channels and "u" not in train.channels else "u"
+    channel = train.compared()
     a, b = (sizes.channels.get(channel, Size(0, 0, 0)) for sizes in (train, held))
     return Fit(*UNITS[channel], a.before, a.after, b.before, b.after, a.floor)
 
