@@ -18,7 +18,8 @@ from fluxproof.diagnosis.ground.recording import RecordingError
 from golden_model.drive_keys import DriveError
 from scripts.fuzz.case import Case
 
-SECONDS, TURN, NAMES_FILE = 1.5, 200, True
+# Half a gigabyte takes a slow machine two seconds to fill, and "m" is to be found for its memory.
+SECONDS, TURN, NAMES_FILE = 5.0, 200, True
 ELSEWHERE = "/fluxproof_planted_fault"
 kept: list = []
 
