@@ -65,7 +65,7 @@ def test_closed_loop_in_ghdl(tmp_path):
     ("Hall sensors: 111 at enable", 12),
     pytest.param("Hall sensors: 111", 12, marks=pytest.mark.slow),
     pytest.param("Hall sensors: 000", 12, marks=pytest.mark.slow),
-    ("Hall sensors: skipped", 12),
+    pytest.param("Hall sensors: skipped", 12, marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_faults_of_the_board_in_ghdl(run, after, tmp_path):
     """What turns the gates off by name, through the pins: every clock as the golden board (test_front_ends judges)."""

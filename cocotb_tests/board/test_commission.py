@@ -48,7 +48,7 @@ def test_a_rotor_in_resonance_with_the_field_is_aligned_at_a_slower_one():
     assert run(case(30)).right
 
 
-@pytest.mark.parametrize("name", halved([name for name in FAULTS if name not in AGAIN], every=4))
+@pytest.mark.parametrize("name", halved([name for name in FAULTS if name not in AGAIN], every=8))
 def test_each_fault_is_refused_for_its_reason(name):
     right, said, current = refused(name, case(1002))
     assert right, said

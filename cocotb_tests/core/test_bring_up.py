@@ -16,6 +16,7 @@ import pytest
 from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.host.golden_board import GoldenBoard
 from cocotb_tests.support.host.rtl_board import RtlBoard
+from cocotb_tests.support.slow import slowly
 from fluxproof.checkout import DRIVES, ROOT
 from fluxproof.cosim import verilog
 from fluxproof.print_registers import c_lines
@@ -164,7 +165,7 @@ def test_torque_mode(board, drive, program):
     assert fast.gate_word == 0
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGBUS], ids=lambda n: n.name)
+@pytest.mark.parametrize("number", [signal.SIGINT, slowly(signal.SIGTERM), signal.SIGBUS], ids=lambda n: n.name)
 def test_gates_are_off_after_a_signal(board, program, number):
     """Ctrl-C, a service manager's stop and a bus error while the motor turns."""
     board = board()

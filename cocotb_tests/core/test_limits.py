@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.core.limits import DRIVE, QUARTER, SET, first, play, told
+from cocotb_tests.support.slow import slowly
 from fluxproof.checkout import ROOT
 from fluxproof.cosim.golden_clock import GoldenClock
 from fluxproof.cosim.scenarios import RPM
@@ -23,8 +24,9 @@ from golden_model.scaling import PARTS
 from golden_model.units import from_si, one_is
 
 
-@pytest.mark.parametrize("turned", [1.1, 2.0, 2.9])
-@pytest.mark.parametrize("rpm", [300.0, -300.0])
+@pytest.mark.parametrize("rpm, turned", [
+    (300.0, 1.1), (-300.0, 2.0), (300.0, 2.9), slowly(-300.0, 1.1), slowly(300.0, 2.0), slowly(-300.0, 2.9),
+])  # fmt: skip
 def test_wrong_angle_is_a_runaway(rpm, turned):
     """The rotor's angle 99, 180, 261 degrees off at 300 rpm: runaway is named below a third of the rated speed.
 

@@ -48,6 +48,7 @@ def fleet_of(program, inputs, tmp_path) -> None:
     assert [row["verdict"] for row in rows] == ["bad_recording"] * 2, [row["reason"] for row in rows]
 
 
+@pytest.mark.slow
 def test_the_script_of_the_set_up_runs_a_fleet(script, inputs, tmp_path):
     fleet_of([script], inputs, tmp_path)
 

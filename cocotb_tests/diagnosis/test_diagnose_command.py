@@ -253,7 +253,7 @@ def test_unusable_input_ends_in_one_line_and_status_2(name, tmp_path, capsys):
     assert str(path) in printed.err and "\x1b" not in printed.err and not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("half", [slice(4), slice(4, 8)])  # more than five findings are left to the report
+@pytest.mark.parametrize("half", [slice(4), slowly(slice(4, 8))])  # more than five findings are left to the report
 def test_unusable_parts_beside_a_good_one_are_named(half, tmp_path, capsys):
     paths = [tmp_path / name for name in list(UNUSABLE)[half]]
     for path in paths:
@@ -330,7 +330,7 @@ def test_failing_overlay_adds_only_a_note(dump, tmp_path, monkeypatch):
     answer(tmp_path / "out")
 
 
-@pytest.mark.parametrize("digit, every", [("0", 12), slowly("0", 1), slowly("5", 1)])
+@pytest.mark.parametrize("digit, every", [("0", 24), slowly("0", 1), slowly("5", 1)])
 def test_files_with_flipped_bits_end_without_traceback_and_without_a_name(digit, every, tmp_path):
     """Bits flipped in files of every format: they may be rejected, but no name comes without a finding."""
     nominal = nominal_of(tmp_path)

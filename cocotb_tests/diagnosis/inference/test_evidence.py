@@ -59,7 +59,7 @@ def test_a_curve_may_be_wrong_without_being_so():
     y = NOISE * np.random.default_rng(1).standard_normal(ROWS)
     none, large, larger = (value_of(y, np.full(ROWS, w)) for w in (0.0, 0.3, 0.6))
     assert large[0] == pytest.approx(none[0]) == larger[0]
-    assert none[-1].tolist() == [1.0] and large[-1].tolist() == [0.0] == larger[-1].tolist()
+    assert none.mu.tolist() == [1.0] and large.mu.tolist() == [0.0] == larger.mu.tolist()
 
 
 def test_a_curve_that_is_wrong_explains_what_is_left():
@@ -68,7 +68,7 @@ def test_a_curve_that_is_wrong_explains_what_is_left():
     doubt = np.where(np.arange(ROWS) % 3 == 0, 1.0, 0.0)  # at some operating points only
     y = NOISE * rng.standard_normal(ROWS) + 0.2 * doubt * rng.standard_normal(ROWS)
     without, with_it = value_of(y, np.zeros(ROWS)), value_of(y, doubt)
-    assert with_it[0] > without[0] + 50.0 and 0.1 <= with_it[-1][0] <= 0.4
+    assert with_it[0] > without[0] + 50.0 and 0.1 <= with_it.mu[0] <= 0.4
 
 
 def test_an_effect_is_found_beside_errors_of_a_curve():

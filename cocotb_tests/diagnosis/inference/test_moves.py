@@ -40,9 +40,15 @@ CASES = {
     # Another measurement error than that of the best set explains more on its own linearisation.
     "other_errors": (own("ab", 60.0, 60.0) | {("be", "ab"): 45.0} | own("be", 100.0), "be"),
     # A cause beside the right angle, which the best set corrects together with a wrong current.
-    "within_errors": (own("aef", 80.0, 80.0) | own("e", 20.0) | {("be", "e"): 100.0} | own("be", 100.0), "be"),
+    "within_errors": (
+        own("ef", 60.0, 60.0) | own("aef", 80.0, 80.0) | own("e", 20.0) | {("be", "e"): 100.0} | own("be", 100.0),
+        "be",
+    ),
     # An offset beside a resistance that is half wrong: three other causes stand for what is not linear.
-    "simpler": (own("abc", 100.0, 100.0) | own("g", 75.0, 75.0) | own("de", 120.0, 70.0), "de"),
+    "simpler": (
+        own("ab", 80.0, 80.0) | own("abc", 100.0, 100.0) | own("g", 75.0, 75.0) | own("de", 120.0, 70.0),
+        "de",
+    ),
     # A friction that is impossible beside a wrong load is possible alone.
     "parts": (BEYOND | own("ef", 100.0, 100.0) | own("g", 120.0, float("-inf")) | own("fg", 110.0, 105.0), "g"),
     # A pair that explains less than the best one only where the latter's data are corrected.

@@ -39,7 +39,7 @@ def test_there_are_enough_mistakes():
     assert len(MISTAKES) >= 25
 
 
-@pytest.mark.parametrize("name", halved(MISTAKES, every=17))
+@pytest.mark.parametrize("name", halved(MISTAKES, every=34))
 def test_a_mistake_is_told_and_nothing_else(name, tmp_path):
     mistake = MISTAKES[name]
     recording, drive = written(mistake, tmp_path)
@@ -90,7 +90,7 @@ def test_an_effect_behind_a_mistake_is_named_with_its_size(name, tmp_path):
     assert found.value == pytest.approx(0.15675, rel=0.005)
 
 
-@pytest.mark.parametrize("name", halved(IN_TABLES, every=8))
+@pytest.mark.parametrize("name", halved(IN_TABLES, every=16))
 def test_a_mistake_is_told_from_operating_points(name, tmp_path):
     mistake = dataclasses.replace(MISTAKES[name], dq=True)
     recording, drive = written(mistake, tmp_path)

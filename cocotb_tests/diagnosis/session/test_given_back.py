@@ -36,7 +36,7 @@ def sizes(worked):
     return Sizes(setup, setup.cells.y, setup.cells.y, np.ones(len(setup.view), bool), True)
 
 
-@pytest.mark.parametrize("name", halved(CATALOGUE, every=12))
+@pytest.mark.parametrize("name", halved(CATALOGUE, every=24))
 def test_the_improved_drive_leaves_no_misfit(name, tmp_path):
     effect = CATALOGUE[name]
     if isinstance(effect, MeasurementError) or name in STAYS:

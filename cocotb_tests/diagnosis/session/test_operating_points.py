@@ -183,7 +183,7 @@ def test_a_scale_of_two_is_found_beside_several_usual_errors(tmp_path):
     assert named <= {"dead_time", "inductance_q", "magnet_flux", "resistance"}, answer.sentence
 
 
-@pytest.mark.parametrize("rows", [1, 2, 3])
+@pytest.mark.parametrize("rows", [1, slowly(2), 3])
 def test_few_rows_of_a_healthy_drive_are_healthy(tmp_path, rows):
     for first in (0, 4, 10, 20):
         answer = answer_of(tmp_path, {k: v[first : first + rows] for k, v in table().items()})

@@ -18,6 +18,7 @@ STEPS, SETTLED = 20, 0.03  # most steps; relative change of all sizes and lambda
 SMALL, LARGE = 1e-200, 1e200  # range of a product of variances, each of which lies within 1e-100 and 1e100
 FACTORS = np.array([0.1, 0.35, 0.7, 1.0, 1.4, 3.0, 10.0])  # of the discrepancy: the grid of every step
 SEEN = np.array([0.0, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0])  # shares mu: the grid of every step
+STRAINED = 2.0  # standard deviations beyond which a torque is not explained without a load
 FORMULA, CURVE = 0, 1  # kinds of columns
 
 jit = numba.njit(cache=True, error_model="numpy")  # no division here is by zero, which need not be checked in every row
@@ -68,7 +69,7 @@ def evidence(rows: BalanceRows, columns: Columns, prior: Prior, start: float) ->
         if moved < SETTLED:
             last = step + 1
     value -= _log_never_free(rows, prior, state)
-    return Found(value, state.c, state.cov, state.sizes, state.lam, state.mu)
+    return Found(value, state.c, state.cov, state.sizes, state.lam, state.mu, _strained(rows, prior, state))
 
 
 @jit
@@ -259,6 +260,17 @@ def _share_seen(rows, state):
                 score[g, h] -= 0.5 * (state.squares[i] / u + np.log(u))
     for g in range(rows.groups):
         state.mu[g] = SEEN[np.argmax(score[g])]
+
+
+@jit
+def _strained(rows, prior, state):
+    """Whether a load may be hidden: another start can find one only where a row has one or is not explained."""
+    for i in range(len(rows.y)):
+        if rows.group[i] == rows.loads:
+            known = rows.variance[i] + state.own[i] + prior.typical**2 * state.error2[i]
+            if state.loaded[i] > 0.0 or state.squares[i] > STRAINED**2 * known:
+                return True
+    return False
 
 
 @jit

@@ -67,6 +67,7 @@ class Found(NamedTuple):
     sizes: np.ndarray  # (effects,) in units of the floor
     lam: np.ndarray  # (groups,) discrepancy
     mu: np.ndarray  # (groups,) share of the curves' errors that is seen
+    strained: bool  # whether a row of the load's group has a load, or is further off than twice its error
 
 
 def no_columns(n: int) -> Columns:

@@ -25,6 +25,8 @@ from fluxproof.diagnosis.inference.model import Columns
 from fluxproof.diagnosis.inference.points import condense
 from fluxproof.diagnosis.inference.setup import Setup, repeated
 
+LOADED_FROM = (1.5, 3.0)  # times the smallest torque: rows above it are taken as loaded at first
+
 
 class Problem:
     """Columns and misfit at one linearisation; totals: {effect: {coefficient: value}} of its measurement errors."""
@@ -126,8 +128,10 @@ class Problem:
         core = np.array([tells(self.keys[n]) for n in mine] + [True] * common, bool)
         formula = np.array([0.0 if is_exact(self.setup.effects[n]) else k.FORMULA for n in names] + [0.0])
         drags = p.loads >= 0 and bool(x[p.group == p.loads].any())
-        columns, starts = Columns(x, scale, owner, core, most, formula), (np.inf, 1.5, 3.0) if drags else (np.inf,)
-        tried = [evidence(p.rows(), columns, self.setup.prior(p), start) for start in starts]
+        columns, rows, prior = Columns(x, scale, owner, core, most, formula), p.rows(), self.setup.prior(p)
+        tried = [evidence(rows, columns, prior, np.inf)]
+        if drags and tried[0].strained:  # which rows are loaded depends on which are taken so at first
+            tried += [evidence(rows, columns, prior, start) for start in LOADED_FROM]
         best = max(tried, key=lambda found: found.log_evidence)
         own = slice(len(take))
         return take, best.log_evidence, best.c[own], best.covariance[own, own], best.sizes[:-1], best.lam, best.mu
