@@ -45,10 +45,7 @@ CASES = {
         "be",
     ),
     # An offset beside a resistance that is half wrong: three other causes stand for what is not linear.
-    "simpler": (
-        own("ab", 80.0, 80.0) | own("abc", 100.0, 100.0) | own("g", 75.0, 75.0) | own("de", 120.0, 70.0),
-        "de",
-    ),
+    "simpler": (own("abc", 100.0, 100.0) | own("g", 40.0, 40.0) | own("de", 120.0, 45.0), "de"),
     # A friction that is impossible beside a wrong load is possible alone.
     "parts": (BEYOND | own("ef", 100.0, 100.0) | own("g", 120.0, float("-inf")) | own("fg", 110.0, 105.0), "g"),
     # A pair that explains less than the best one only where the latter's data are corrected.
