@@ -31,6 +31,12 @@ package fluxproof_pkg is
   constant V_LEG_W : positive := 18;  -- S(-1,18)
   constant LIMIT_W : positive := 9;  -- U(1,8)
   constant SAMPLE_TIME_W : positive := 17;  -- U(-1,18)
+  constant MOTOR_VOLTAGE_W : positive := 24;  -- S(1,22)
+  constant MOTOR_LEG_W : positive := 29;  -- S(6,22)
+  constant MOTOR_FLUX_W : positive := 40;  -- S(1,38)
+  constant MOTOR_TRIG_W : positive := 18;  -- S(0,17)
+  constant MOTOR_ANGLE_W : positive := 25;  -- U(0,25)
+  constant MOTOR_WAVE_W : positive := 18;  -- S(-2,19)
   constant PU_TO_INTEGRAL : natural := 12;
   constant PU_TO_FLUX : natural := 7;
   constant FLUX_TO_STATE : natural := 7;
@@ -692,6 +698,14 @@ package fluxproof_pkg is
   -- svm_delay_compensation: 001, section 5.2, SVM delay compensation
   constant SVM_DELAY_COMPENSATION_LATENCY : positive := 3;
   constant SVM_DELAY_COMPENSATION_DROP : natural := 15;
+
+  -- motor_flux: docs/hil.md: d lambda/dt = u - R i
+  constant MOTOR_FLUX_LATENCY : positive := 10;
+  constant MOTOR_FLUX_DROP_RI : natural := 15;
+  constant MOTOR_FLUX_DROP_D : natural := 5;
+  constant MOTOR_FLUX_DROP_BETA : natural := 11;
+  constant MOTOR_FLUX_DROP_OUT : natural := 15;
+  constant MOTOR_FLUX_SQRT3 : signed(17 downto 0) := to_signed(113512, 18);  -- 1.732050808 as S(1,16), signed for the multiplier
 
   -- clarke: 001, eq. (1): stator frame
   constant CLARKE_LATENCY : positive := 5;

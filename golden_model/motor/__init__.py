@@ -1,0 +1,1 @@
+"""The motor that runs beside the core: inverter, fluxes, currents, shaft, sensors; docs/hil.md."""
