@@ -707,6 +707,13 @@ package fluxproof_pkg is
   constant MOTOR_FLUX_DROP_OUT : natural := 15;
   constant MOTOR_FLUX_SQRT3 : signed(17 downto 0) := to_signed(113512, 18);  -- 1.732050808 as S(1,16), signed for the multiplier
 
+  -- motor_inverter: docs/hil.md: legs of the inverter
+  constant MOTOR_INVERTER_LATENCY : positive := 1;
+
+  -- motor_legs: docs/hil.md: legs of the inverter
+  constant MOTOR_LEGS_LATENCY : positive := 9;
+  constant MOTOR_LEGS_DROP_X : natural := 2;
+
   -- clarke: 001, eq. (1): stator frame
   constant CLARKE_LATENCY : positive := 5;
   constant CLARKE_THIRD : signed(17 downto 0) := to_signed(87381, 18);  -- 0.333333333 as U(-1,18), signed for the multiplier
