@@ -699,6 +699,50 @@ package fluxproof_pkg is
   constant SVM_DELAY_COMPENSATION_LATENCY : positive := 3;
   constant SVM_DELAY_COMPENSATION_DROP : natural := 15;
 
+  -- motor_angle: docs/hil.md: what follows from the rotor's angle
+  constant MOTOR_ANGLE_LATENCY : positive := 10;
+  constant MOTOR_ANGLE_F_BITS : natural := 15;
+  constant MOTOR_ANGLE_DELTA_BITS : natural := 8;
+  constant MOTOR_ANGLE_DROP_PROD : natural := 20;
+  constant MOTOR_ANGLE_DROP_TRIG : natural := 5;
+  constant MOTOR_ANGLE_DROP_SLOPE : natural := 12;
+  constant MOTOR_ANGLE_SLOPE : signed(17 downto 0) := to_signed(83443, 18);  -- 162.974661726 as U(8,9), signed for the multiplier
+  type motor_angle_delta_t is array (0 to 255) of signed(14 downto 0);
+  constant MOTOR_ANGLE_DELTA : motor_angle_delta_t := (  -- S(-10,24)
+    15x"4dee", 15x"4e53", 15x"4eb7", 15x"4f1c", 15x"4f80", 15x"4fe5", 15x"5049", 15x"50ae",
+    15x"5113", 15x"5177", 15x"51dc", 15x"5240", 15x"52a5", 15x"5309", 15x"536e", 15x"53d2",
+    15x"5437", 15x"549b", 15x"5500", 15x"5564", 15x"55c9", 15x"562d", 15x"5692", 15x"56f7",
+    15x"575b", 15x"57c0", 15x"5824", 15x"5889", 15x"58ed", 15x"5952", 15x"59b6", 15x"5a1b",
+    15x"5a7f", 15x"5ae4", 15x"5b48", 15x"5bad", 15x"5c11", 15x"5c76", 15x"5cda", 15x"5d3f",
+    15x"5da4", 15x"5e08", 15x"5e6d", 15x"5ed1", 15x"5f36", 15x"5f9a", 15x"5fff", 15x"6063",
+    15x"60c8", 15x"612c", 15x"6191", 15x"61f5", 15x"625a", 15x"62be", 15x"6323", 15x"6388",
+    15x"63ec", 15x"6451", 15x"64b5", 15x"651a", 15x"657e", 15x"65e3", 15x"6647", 15x"66ac",
+    15x"6710", 15x"6775", 15x"67d9", 15x"683e", 15x"68a2", 15x"6907", 15x"696b", 15x"69d0",
+    15x"6a35", 15x"6a99", 15x"6afe", 15x"6b62", 15x"6bc7", 15x"6c2b", 15x"6c90", 15x"6cf4",
+    15x"6d59", 15x"6dbd", 15x"6e22", 15x"6e86", 15x"6eeb", 15x"6f4f", 15x"6fb4", 15x"7018",
+    15x"707d", 15x"70e2", 15x"7146", 15x"71ab", 15x"720f", 15x"7274", 15x"72d8", 15x"733d",
+    15x"73a1", 15x"7406", 15x"746a", 15x"74cf", 15x"7533", 15x"7598", 15x"75fc", 15x"7661",
+    15x"76c6", 15x"772a", 15x"778f", 15x"77f3", 15x"7858", 15x"78bc", 15x"7921", 15x"7985",
+    15x"79ea", 15x"7a4e", 15x"7ab3", 15x"7b17", 15x"7b7c", 15x"7be0", 15x"7c45", 15x"7ca9",
+    15x"7d0e", 15x"7d73", 15x"7dd7", 15x"7e3c", 15x"7ea0", 15x"7f05", 15x"7f69", 15x"7fce",
+    15x"0032", 15x"0097", 15x"00fb", 15x"0160", 15x"01c4", 15x"0229", 15x"028d", 15x"02f2",
+    15x"0357", 15x"03bb", 15x"0420", 15x"0484", 15x"04e9", 15x"054d", 15x"05b2", 15x"0616",
+    15x"067b", 15x"06df", 15x"0744", 15x"07a8", 15x"080d", 15x"0871", 15x"08d6", 15x"093a",
+    15x"099f", 15x"0a04", 15x"0a68", 15x"0acd", 15x"0b31", 15x"0b96", 15x"0bfa", 15x"0c5f",
+    15x"0cc3", 15x"0d28", 15x"0d8c", 15x"0df1", 15x"0e55", 15x"0eba", 15x"0f1e", 15x"0f83",
+    15x"0fe8", 15x"104c", 15x"10b1", 15x"1115", 15x"117a", 15x"11de", 15x"1243", 15x"12a7",
+    15x"130c", 15x"1370", 15x"13d5", 15x"1439", 15x"149e", 15x"1502", 15x"1567", 15x"15cb",
+    15x"1630", 15x"1695", 15x"16f9", 15x"175e", 15x"17c2", 15x"1827", 15x"188b", 15x"18f0",
+    15x"1954", 15x"19b9", 15x"1a1d", 15x"1a82", 15x"1ae6", 15x"1b4b", 15x"1baf", 15x"1c14",
+    15x"1c78", 15x"1cdd", 15x"1d42", 15x"1da6", 15x"1e0b", 15x"1e6f", 15x"1ed4", 15x"1f38",
+    15x"1f9d", 15x"2001", 15x"2066", 15x"20ca", 15x"212f", 15x"2193", 15x"21f8", 15x"225c",
+    15x"22c1", 15x"2326", 15x"238a", 15x"23ef", 15x"2453", 15x"24b8", 15x"251c", 15x"2581",
+    15x"25e5", 15x"264a", 15x"26ae", 15x"2713", 15x"2777", 15x"27dc", 15x"2840", 15x"28a5",
+    15x"2909", 15x"296e", 15x"29d3", 15x"2a37", 15x"2a9c", 15x"2b00", 15x"2b65", 15x"2bc9",
+    15x"2c2e", 15x"2c92", 15x"2cf7", 15x"2d5b", 15x"2dc0", 15x"2e24", 15x"2e89", 15x"2eed",
+    15x"2f52", 15x"2fb7", 15x"301b", 15x"3080", 15x"30e4", 15x"3149", 15x"31ad", 15x"3212"
+  );
+
   -- motor_flux: docs/hil.md: d lambda/dt = u - R i
   constant MOTOR_FLUX_LATENCY : positive := 10;
   constant MOTOR_FLUX_DROP_RI : natural := 15;
