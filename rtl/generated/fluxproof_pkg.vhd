@@ -743,6 +743,17 @@ package fluxproof_pkg is
     15x"2f52", 15x"2fb7", 15x"301b", 15x"3080", 15x"30e4", 15x"3149", 15x"31ad", 15x"3212"
   );
 
+  -- motor_current: docs/hil.md: currents from fluxes
+  constant MOTOR_CURRENT_LATENCY : positive := 19;
+  constant MOTOR_CURRENT_FINER : natural := 4;
+  constant MOTOR_CURRENT_DROP_FIRST : natural := 13;
+  constant MOTOR_CURRENT_DROP_SECOND : natural := 17;
+  constant MOTOR_CURRENT_TO_X : natural := 1;
+  constant MOTOR_CURRENT_DROP_I : natural := 6;
+  constant MOTOR_CURRENT_DROP : natural := 17;
+  constant MOTOR_CURRENT_HALF_SQRT3 : signed(17 downto 0) := to_signed(113512, 18);  -- 0.866025404 as S(0,17), signed for the multiplier
+  constant MOTOR_CURRENT_DROP_BETA : natural := 17;
+
   -- motor_flux: docs/hil.md: d lambda/dt = u - R i
   constant MOTOR_FLUX_LATENCY : positive := 10;
   constant MOTOR_FLUX_DROP_RI : natural := 15;
@@ -757,6 +768,17 @@ package fluxproof_pkg is
   -- motor_legs: docs/hil.md: legs of the inverter
   constant MOTOR_LEGS_LATENCY : positive := 9;
   constant MOTOR_LEGS_DROP_X : natural := 2;
+
+  -- motor_unsaturated: docs/hil.md: currents from fluxes
+  constant MOTOR_UNSATURATED_LATENCY : positive := 10;
+  constant MOTOR_UNSATURATED_DROP : natural := 17;
+  constant MOTOR_UNSATURATED_DROP_X : natural := 17;
+  constant MOTOR_UNSATURATED_LOW_BITS : natural := 8;
+  constant MOTOR_UNSATURATED_WAVE_SHIFT : natural := 4;
+  constant MOTOR_UNSATURATED_SLOPE_SHIFT : natural := 7;
+  constant MOTOR_UNSATURATED_F_BITS : natural := 17;
+  constant MOTOR_UNSATURATED_CENTRE : natural := 4128768;
+  constant MOTOR_UNSATURATED_LAST : natural := 8257535;
 
   -- clarke: 001, eq. (1): stator frame
   constant CLARKE_LATENCY : positive := 5;
