@@ -34,6 +34,7 @@ MOTOR_LEG = Format(1, 6, 22)  # a leg's voltage, summed over the clocks of a ste
 MOTOR_FLUX = Format(1, 1, 38)  # flux that is integrated: its LSB is that of a leg's voltage times a clock
 MOTOR_TRIG = Format(1, 0, 17)  # sine and cosine of the motor, below 1
 MOTOR_ANGLE = Format(0, 0, 25)  # angles of the motor in turns
+MOTOR_SPEED = Format(1, -13, 37)  # speed of the motor in turns a step
 MOTOR_WAVE = Format(1, -2, 19)  # harmonic fluxes and cogging torque: below a quarter of their base
 
 PU_W, TURN_W, INTEGRAL_W, V_LEG_W = PU.width, TURN.width, INTEGRAL.width, V_LEG.width

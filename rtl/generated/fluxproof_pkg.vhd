@@ -36,6 +36,7 @@ package fluxproof_pkg is
   constant MOTOR_FLUX_W : positive := 40;  -- S(1,38)
   constant MOTOR_TRIG_W : positive := 18;  -- S(0,17)
   constant MOTOR_ANGLE_W : positive := 25;  -- U(0,25)
+  constant MOTOR_SPEED_W : positive := 25;  -- S(-13,37)
   constant MOTOR_WAVE_W : positive := 18;  -- S(-2,19)
   constant PU_TO_INTEGRAL : natural := 12;
   constant PU_TO_FLUX : natural := 7;
@@ -768,6 +769,18 @@ package fluxproof_pkg is
   -- motor_legs: docs/hil.md: legs of the inverter
   constant MOTOR_LEGS_LATENCY : positive := 9;
   constant MOTOR_LEGS_DROP_X : natural := 2;
+
+  -- motor_shaft: docs/hil.md: shaft
+  constant MOTOR_SHAFT_LATENCY : positive := 13;
+  constant MOTOR_SHAFT_DROP_TORQUE : natural := 16;
+  constant MOTOR_SHAFT_DROP_VISCOUS : natural := 19;
+  constant MOTOR_SHAFT_DROP_J : natural := 23;
+  constant MOTOR_SHAFT_DROP_OMEGA : natural := 19;
+  constant MOTOR_SHAFT_SET_SHIFT : natural := 26;
+  constant MOTOR_SHAFT_WAVE_SHIFT : natural := 4;
+  constant MOTOR_SHAFT_LOW_BITS : natural := 8;
+  constant MOTOR_SHAFT_OMEGA_W : natural := 44;
+  constant MOTOR_SHAFT_THETA_W : natural := 56;
 
   -- motor_unsaturated: docs/hil.md: currents from fluxes
   constant MOTOR_UNSATURATED_LATENCY : positive := 10;
