@@ -782,6 +782,9 @@ package fluxproof_pkg is
   constant MOTOR_SHAFT_OMEGA_W : natural := 44;
   constant MOTOR_SHAFT_THETA_W : natural := 56;
 
+  -- motor_table: docs/hil.md: maps and tables
+  constant MOTOR_TABLE_LATENCY : positive := 2;
+
   -- motor_unsaturated: docs/hil.md: currents from fluxes
   constant MOTOR_UNSATURATED_LATENCY : positive := 10;
   constant MOTOR_UNSATURATED_DROP : natural := 17;
