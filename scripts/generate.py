@@ -16,6 +16,7 @@ from golden_model import fluxproof, formats
 from golden_model.block import Const, Port
 from golden_model.fixed import Format
 from golden_model.io import register_map
+from golden_model.motor import motor_model
 from golden_model.records import RECORDS, vhdl_type
 from golden_model.registry import BLOCKS
 from scripts import generate_telemetry
@@ -89,6 +90,9 @@ def render() -> str:
     lines += ["", "  -- fluxproof: clocks from the raw sample to the duties, shortest distance of two samples"]
     lines.append(f"  constant FLUXPROOF_SAMPLE_TO_DUTY : positive := {fluxproof.SAMPLE_TO_DUTY};")
     lines.append(f"  constant FLUXPROOF_SAMPLE_INTERVAL : positive := {fluxproof.SAMPLE_INTERVAL};")
+    lines += ["", "  -- motor_model: clocks of a step, steps that the rotor is held at the start"]
+    lines.append(f"  constant MOTOR_STEP : positive := {motor_model.STEP};")
+    lines.append(f"  constant MOTOR_STARTING : positive := {motor_model.STARTING};")
     for name, fields in RECORDS.items():
         lines += record(name, fields)
     lines += ["", "  constant NOTHING_ESTIMATED : estimated_t := (", *zeros(RECORDS["estimated_t"]), "  );"]

@@ -48,6 +48,10 @@ package fluxproof_pkg is
   constant FLUXPROOF_SAMPLE_TO_DUTY : positive := 39;
   constant FLUXPROOF_SAMPLE_INTERVAL : positive := 57;
 
+  -- motor_model: clocks of a step, steps that the rotor is held at the start
+  constant MOTOR_STEP : positive := 17;
+  constant MOTOR_STARTING : positive := 12;
+
   type sample_t is record
     adc_a         : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase a
     adc_b         : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase b
