@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The motor of the FPGA beside the double-precision plant: both get the same gates, clock by clock, and the same load.
+"""The motor of the FPGA beside the double-precision plant, with the same load, seen at the same times.
 
-A field-oriented speed control in floating point drives the plant; the motor follows nothing but the gates, so its rotor is
-held by the plant's voltage only.  A PWM period is a whole number of the motor's steps, so both are seen at the same time.
+    HELD   the same gates, clock by clock; the motor's shaft is turned as the plant's: what differs is electrical alone
+    OWN    a control of its own for each, of the same gains and references: the whole drive
+
+A free shaft with the plant's gates would be a synchronous machine at the mains: lightly loaded it hunts, and a difference
+grows however small it was.  The control is field-oriented, in floating point, with an angle that is led along the reference, so that neither drifts.
+A PWM period is a whole number of the motor's steps.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -22,49 +27,58 @@ from fluxproof.plant.switching import advance_switching
 from golden_model.formats import FLUX, MOTOR_VOLTAGE, PU
 from golden_model.motor import motor_model, motor_shaft
 
-motor_step, MotorInputs, STEP = motor_model.step, motor_model.Inputs, motor_model.STEP
+HELD, OWN = 0, 1
+motor_step, Registers, SET_SHIFT = motor_model.step, motor_model.Registers, motor_shaft.SET_SHIFT
+MotorInputs, STEP = motor_model.Inputs, motor_model.STEP
+SETTLING = 2000  # steps with all gates off before the ride, in which no current is left
 COLUMNS = ("i_a", "i_b", "i_c", "i_d", "i_q", "torque", "omega", "theta")
 
 
 class Control(NamedTuple):
-    """Gains of the speed control of the plant, and its limit."""
+    """Gains of the control, and what it knows of the drive."""
 
     current_p: float
     current_i: float  # per period
     speed_p: float
-    speed_i: float
+    speed_i: float  # per period
+    angle_p: float  # speed per angle
     limit_a: float
     u_dc: float
     pole_pairs: float
+    l_d: float
+    l_q: float
+    psi_m: float
 
 
 class Ride(NamedTuple):
     """What both go through, a value a period."""
 
     speed_rad_s: np.ndarray
+    angle_rad: np.ndarray
     load_nm: np.ndarray
 
 
 @mixed_kernel
-def duties(control, memory, state, speed):
-    """Duties of the three legs; ``memory``: integrals of both axes and of the speed, changed in place."""
+def duties(control, memory, seen, speed, angle):
+    """Duties of the three legs from ``seen`` = (i_d, i_q, omega, theta); ``memory``: integrals, changed in place."""
     c = control
-    error = speed - state[L.OMEGA_M]
+    i_d, i_q, omega, theta = seen
+    error = speed + c.angle_p * (angle - theta) - omega
     i_q_ref = c.speed_p * error + memory[2]
     if abs(i_q_ref) > c.limit_a:
         i_q_ref = math.copysign(c.limit_a, i_q_ref)
     else:
         memory[2] += c.speed_i * error
-    e_d, e_q = -state[L.I_D], i_q_ref - state[L.I_Q]
+    e_d, e_q = -i_d, i_q_ref - i_q
     memory[0] += c.current_i * e_d
     memory[1] += c.current_i * e_q
-    w = c.pole_pairs * state[L.OMEGA_M]
-    u_d = c.current_p * e_d + memory[0] - w * state[L.LAMBDA_Q]
-    u_q = c.current_p * e_q + memory[1] + w * state[L.LAMBDA_D]
+    w = c.pole_pairs * omega
+    u_d = c.current_p * e_d + memory[0] - w * c.l_q * i_q
+    u_q = c.current_p * e_q + memory[1] + w * (c.psi_m + c.l_d * i_d)
     size, most = math.hypot(u_d, u_q), c.u_dc / math.sqrt(3.0)
     if size > most:
         u_d, u_q = u_d * most / size, u_q * most / size
-    cos, sin = math.cos(state[L.THETA_E]), math.sin(state[L.THETA_E])
+    cos, sin = math.cos(c.pole_pairs * theta), math.sin(c.pole_pairs * theta)
     alpha, beta = u_d * cos - u_q * sin, u_d * sin + u_q * cos
     half = math.sqrt(3.0) / 2 * beta
     a, b, c_ = alpha, half - alpha / 2, -half - alpha / 2
@@ -139,36 +153,73 @@ def follow(motor, word, events, steps, u_dc, load, registers, tables):
 
 
 @mixed_kernel
-def ride_both(plant, params, control, motor, bus, ride, registers, tables, steps, dead, rows):
-    """Both through a ride; ``bus`` = (clock_hz, load codes, code of the bus); ``rows``: COLUMNS of plant, then motor."""
-    clock_hz, load_codes, u_dc_code = bus
+def period_edges(duty, period, dead, word, times, words):
+    """All edges of a period in their order, in place; how many."""
+    count = 0
+    for leg in range(3):
+        count = edges(duty[leg], period, dead, leg, word, times, words, count)
+    sorted_events(times, words, count)
+    return count
+
+
+@mixed_kernel
+def held(r, omega_set):
+    """The registers with another held speed."""
+    return Registers(
+        r.stiffness, r.v_switch, r.v_diode, r.r_a, r.r_b, r.r_c, r.psi_start, r.psi_m, r.inv_l_d, r.inv_l_q,
+        r.k_j, r.viscous, r.coulomb, r.pole_pairs, r.hold, omega_set,
+    )  # fmt: skip
+
+
+@mixed_kernel
+def ride_both(how, plant, params, control, motor, bus, ride, registers, tables, steps, dead, rows):
+    """Both through a ride.
+
+    ``bus`` = (clock_hz, code of the bus, load codes, units); ``rows``: COLUMNS of the plant, then of the motor in ``units``.
+    """
+    clock_hz, u_dc_code, load_codes, units = bus
     period = steps * STEP
-    memory, word = np.zeros(3), 0
+    memory, own_memory, word, own_word = np.zeros(3), np.zeros(3), 0, 0
     times, words = np.zeros(3 * 6, np.int64), np.zeros(3 * 6, np.int64)
+    own_times, own_words = np.zeros(3 * 6, np.int64), np.zeros(3 * 6, np.int64)
     at_s, gates = np.zeros(3 * 6), np.zeros(3 * 6, np.int64)
+    turns, last = 0, 0
     for n in range(len(rows)):
-        duty = duties(control, memory, plant, ride.speed_rad_s[n])
-        count = 0
-        for leg in range(3):
-            count = edges(duty[leg], period, dead, leg, word, times, words, count)
-        sorted_events(times, words, count)
-        plant_word = word
+        seen = (plant[L.I_D], plant[L.I_Q], plant[L.OMEGA_M], plant[L.THETA_M])
+        duty = duties(control, memory, seen, ride.speed_rad_s[n], ride.angle_rad[n])
+        count = period_edges(duty, period, dead, word, times, words)
+        before = word
         for k in range(count):
-            plant_word = (plant_word | words[k] >> 6) & ~(words[k] & 63)
-            at_s[k], gates[k] = times[k] / clock_hz, plant_word
+            word = (word | words[k] >> 6) & ~(words[k] & 63)
+            at_s[k], gates[k] = times[k] / clock_hz, word
         advance_switching(
             plant, params, at_s[:count], gates[:count], control.u_dc, ride.load_nm[n], period / clock_hz, -1.0
         )
-        motor, word = follow(motor, word, (times, words, count), steps, u_dc_code, load_codes[n], registers, tables)
-        seen, shaft = motor.chain_1, motor.of_shaft
+        if how == OWN:
+            chain = motor.chain_1
+            theta = rows[n - 1, 15] if n else 0.0
+            own = (chain.i_d * units[3], chain.i_q * units[4], motor.of_shaft.omega * units[6], theta)
+            duty = duties(control, own_memory, own, ride.speed_rad_s[n], ride.angle_rad[n])
+            own_count = period_edges(duty, period, dead, own_word, own_times, own_words)
+            events = (own_times, own_words, own_count)
+        else:
+            own_word, events = before, (times, words, count)
+        if how == HELD:
+            left = plant[L.THETA_M] / units[7] - turns * 2.0**56 - motor.of_shaft.theta
+            now = held(registers, int(round(left / steps / 2**SET_SHIFT)))
+        else:
+            now = registers
+        motor, own_word = follow(motor, own_word, events, steps, u_dc_code, load_codes[n], now, tables)
+        chain, shaft = motor.chain_1, motor.of_shaft
+        turns += (shaft.theta - last < -(1 << 55)) - (shaft.theta - last > (1 << 55))
+        last = shaft.theta
         for k in range(5):
             rows[n, k] = plant[L.I_A + k]
         rows[n, 5], rows[n, 6], rows[n, 7] = plant[L.TORQUE], plant[L.OMEGA_M], plant[L.THETA_M]
-        rows[n, 8], rows[n, 9], rows[n, 10] = seen.i_a, seen.i_b, seen.i_c
-        rows[n, 11], rows[n, 12] = seen.i_d, seen.i_q
-        rows[n, 13] = seen.turn_d * seen.i_q - seen.turn_q * seen.i_d
-        rows[n, 14], rows[n, 15] = shaft.omega, shaft.theta
-    return motor
+        rows[n, 8], rows[n, 9], rows[n, 10] = chain.i_a * units[0], chain.i_b * units[1], chain.i_c * units[2]
+        rows[n, 11], rows[n, 12] = chain.i_d * units[3], chain.i_q * units[4]
+        rows[n, 13] = (chain.turn_d * chain.i_q - chain.turn_q * chain.i_d) * units[5]
+        rows[n, 14], rows[n, 15] = shaft.omega * units[6], (shaft.theta + turns * 2.0**56) * units[7]
 
 
 class Both(NamedTuple):
@@ -178,23 +229,37 @@ class Both(NamedTuple):
     motor: np.ndarray
 
 
-def beside_plant(scale: Scale, machine: Machine, inverter: Inverter, control: Control, ride: Ride, period_s: float) -> Both:
+@dataclass(frozen=True)
+class Drive:
+    """A drive on both sides."""
+
+    scale: Scale
+    machine: Machine
+    inverter: Inverter
+    control: Control
+    period_s: float
+
+
+def beside_plant(drive: Drive, ride: Ride, how: int) -> Both:
     """Both through a ride; the plant has the machine that the motor's rounded registers describe."""
-    registers, tables = motor_registers(scale, machine, inverter), motor_tables(scale, machine)
-    rounded = machine_of(scale, registers, machine, inverter)
-    steps = round(period_s / scale.step_s)
-    dead = round(inverter.dead_time_s * scale.clock_hz)
+    scale, machine, inverter, control = drive.scale, drive.machine, drive.inverter, drive.control
+    registers = motor_registers(scale, machine, inverter, 0.0 if how == HELD else None)
+    tables, rounded = motor_tables(scale, machine), machine_of(scale, registers, machine, inverter)
+    steps, dead = round(drive.period_s / scale.step_s), round(inverter.dead_time_s * scale.clock_hz)
     params = plant_params(rounded, inverter, max_step_s=20e-6)
     plant = initial_state(rounded, params)
     u_dc = scale.u_dc(control.u_dc)
     exact = control._replace(u_dc=u_dc * MOTOR_VOLTAGE.lsb * scale.voltage_v)
     loads = np.array([scale.load(torque) for torque in ride.load_nm], np.int64)
     motor = motor_model.State()
-    for _ in range(2 * motor_model.STARTING):
+    for _ in range(SETTLING):
         motor, _ = motor_step(motor, motor_model.Inputs(u_dc=u_dc), registers, tables, STEP)
-    rows = np.zeros((len(ride.load_nm), 2 * len(COLUMNS)))
-    true_ride = Ride(ride.speed_rad_s, loads * FLUX.lsb * scale.torque_nm)
-    ride_both(plant, params, exact, motor, (scale.clock_hz, loads, u_dc), true_ride, registers, tables, steps, dead, rows)
     units = [scale.current_a * PU.lsb] * 5 + [scale.torque_nm * FLUX.lsb * PU.lsb]
     units += [2 * math.pi / scale.step_s * motor_shaft.OMEGA.lsb, 2 * math.pi * motor_shaft.THETA.lsb]
-    return Both(rows[:, : len(COLUMNS)], rows[:, len(COLUMNS) :] * units)
+    rows = np.zeros((len(ride.load_nm), 2 * len(COLUMNS)))
+    bus = (scale.clock_hz, u_dc, loads, np.array(units))
+    same = ride._replace(load_nm=loads * FLUX.lsb * scale.torque_nm)
+    ride_both(how, plant, params, exact, motor, bus, same, registers, tables, steps, dead, rows)
+    cogging = rounded.cogging_order * rows[:, 7] + rounded.cogging_phase_rad
+    rows[:, 5] -= rounded.cogging_amplitude_nm * np.sin(cogging)
+    return Both(rows[:, : len(COLUMNS)], rows[:, len(COLUMNS) :])

@@ -25,7 +25,9 @@ from golden_model.motor.motor_model import STEP, Registers, Tables
 
 PORTS = {p.name: p for p in motor_model.REGISTERS}
 ROOM = 1.5  # largest flux and voltage per unit: the formats end at 2
-RINGING = 27 / 256  # loop gain of a leg's stiffness without overshoot, for a current that is four steps old
+# Loop gain of a leg's stiffness: i(n + 1) = i(n) - RINGING*i(n - 3) decays by half in eight steps.  27/256 would just not
+# overshoot, 2*sin(pi/14) = 0.445 would not decay; what is left of a blocked current is inversely proportional to it.
+RINGING = 27 / 128
 MAP = 64  # points of the map along each axis, a 32nd of the current's base apart
 
 
