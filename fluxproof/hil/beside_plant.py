@@ -4,9 +4,9 @@
     HELD   the same gates, clock by clock; the motor's shaft is turned as the plant's: what differs is electrical alone
     OWN    a control of its own for each, of the same gains and references: the whole drive
 
-A free shaft with the plant's gates would be a synchronous machine at the mains: lightly loaded it hunts, and a difference
-grows however small it was.  The control is field-oriented, in floating point, with an angle that is led along the reference, so that neither drifts.
-A PWM period is a whole number of the motor's steps.
+A free shaft with the plant's gates would be a synchronous machine at the mains: lightly loaded it hunts, and a
+difference grows however small it was.  The control is field-oriented, in floating point, with an angle that is led along
+the reference, so that neither drifts.  A PWM period is a whole number of the motor's steps.
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ def held(r, omega_set):
 def ride_both(how, plant, params, control, motor, bus, ride, registers, tables, steps, dead, rows):
     """Both through a ride.
 
-    ``bus`` = (clock_hz, code of the bus, load codes, units); ``rows``: COLUMNS of the plant, then of the motor in ``units``.
+    ``bus`` = (clock_hz, code of the bus, load codes, units); ``rows``: COLUMNS of plant, then motor, in ``units``.
     """
     clock_hz, u_dc_code, load_codes, units = bus
     period = steps * STEP

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Registers and tables of the motor in the FPGA from the data of machine and inverter; docs/hil.md derives them.
 
-    scale = motor_scale(machine, u_dc_v, current_a, clock_hz)
-    registers, tables = motor_registers(scale, machine, inverter), motor_tables(scale, machine)
-    machine_of(scale, registers, machine, inverter)      what the rounded registers say, in SI units
+scale = motor_scale(machine, u_dc_v, current_a, clock_hz)
+registers, tables = motor_registers(scale, machine, inverter), motor_tables(scale, machine)
+machine_of(scale, registers, machine, inverter)      what the rounded registers say, in SI units
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from golden_model.motor.motor_model import STEP, Registers, Tables
 
 PORTS = {p.name: p for p in motor_model.REGISTERS}
 ROOM = 1.5  # largest flux and voltage per unit: the formats end at 2
-# Loop gain of a leg's stiffness: i(n + 1) = i(n) - RINGING*i(n - 3) decays by half in eight steps.  27/256 would just not
-# overshoot, 2*sin(pi/14) = 0.445 would not decay; what is left of a blocked current is inversely proportional to it.
+# Loop gain of a leg's stiffness: i(n + 1) = i(n) - RINGING*i(n - 3) decays to 0.86 in a step.  27/256 would just not
+# overshoot, 2*sin(pi/14) = 0.445 would not decay; what is left of a blocked current goes with its inverse.
 RINGING = 27 / 128
 MAP = 64  # points of the map along each axis, a 32nd of the current's base apart
 
@@ -74,7 +74,9 @@ def motor_scale(machine: Machine, u_dc_v: float, current_a: float, clock_hz: flo
     return Scale(clock_hz, current_a, flux, flux / seconds, 1.5 * machine.pole_pairs * flux * current_a)
 
 
-def motor_registers(scale: Scale, machine: Machine, inverter: Inverter, omega_set_rad_s: float | None = None) -> Registers:
+def motor_registers(
+    scale: Scale, machine: Machine, inverter: Inverter, omega_set_rad_s: float | None = None
+) -> Registers:
     """Registers; ValueError where a value does not fit.  ``omega_set_rad_s``: held speed, None: the shaft is free."""
     ohm = scale.voltage_v / scale.current_a
     turn = 2 * math.pi / scale.step_s  # rad/s of a turn a step
@@ -110,7 +112,9 @@ def motor_tables(scale: Scale, machine: Machine) -> Tables:
         for row, x_d in enumerate(axis):
             for column, x_q in enumerate(axis):
                 psi_d = machine.magnet_flux_wb + machine.inductance_d_h * x_d
-                i_d, i_q = currents_from_flux(params, machine.magnet_flux_wb, psi_d, machine.inductance_q_h * x_q, 0.0, 0.0)
+                i_d, i_q = currents_from_flux(
+                    params, machine.magnet_flux_wb, psi_d, machine.inductance_q_h * x_q, 0.0, 0.0
+                )
                 for table, more in ((tables.map_d, i_d - x_d), (tables.map_q, i_q - x_q)):
                     table[row, column] = code("map", more / scale.current_a, POINT)
     for k in range(POINTS):

@@ -97,7 +97,7 @@ def reference(v, _state):
 
 
 def bound(_v, _state):
-    """Trig: rounding, 1 stored as 1 - 2**-17, table, unused angle bits, delta's square; slope: factor at a full rise."""
+    """Trig: rounding, 1 stored as 1 - 2**-17, table, unused bits, delta's square; slope: factor at a full rise."""
     half_delta = _STEP * _HALF
     trig = MOTOR_TRIG.lsb + TABLE.lsb + _STEP / 2 + half_delta**2 / 2 + DELTA.lsb / 2 + 2.0**-FRAC
     along = PU.lsb / 2 + SLOPE.fmt.lsb / 2 * 0.5

@@ -7,7 +7,7 @@
     i_a = i_alpha,  i_b, i_c = -i_alpha/2 +- sqrt(3)/2*i_beta
 
 A map of zeros is the linear machine.  m_RC: R is the row (d axis), C the column (q axis) from the cell's first point.
-Formats: x S(1,22), m S(0,17), f U(0,17), lo and hi 21 fraction bits, i PU.  Every product is rounded half up, sums saturate.
+Formats: x S(1,22), m S(0,17), f U(0,17), lo and hi 21 fraction bits, i PU.  Products half up, sums saturate.
 """
 
 import math
@@ -98,7 +98,9 @@ def stimuli(_rng, _config):
     for k in range(8):
         c, s = (round(MOTOR_TRIG.hi * f(k * math.pi / 4)) for f in (math.cos, math.sin))
         for x_d, x_q in ((X.hi, 0), (0, X.lo), (X.lo, X.lo), (X.hi, X.hi), (1 << 21, -(1 << 21))):
-            ends = {f"{n}_{r}": POINT.hi if v > 0 else POINT.lo for n, v in (("d", x_d), ("q", x_q)) for r in ("00", "11")}
+            ends = {
+                f"{n}_{r}": POINT.hi if v > 0 else POINT.lo for n, v in (("d", x_d), ("q", x_q)) for r in ("00", "11")
+            }
             rows.append(still | ends | {"x_d": x_d, "x_q": x_q, "cos_theta": c, "sin_theta": s})
     return rows
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Integrates the flux linkages of the windings in the stator frame: d lambda/dt = u - R*i, a step of STEP clocks at once.
+"""Integrates the flux linkages of the windings in the stator frame: d lambda/dt = u - R*i, a step at once.
 
-    s_x      = leg_x - r_x*i_x                       of phase x: voltage minus resistive drop, summed over the step's clocks
+    s_x      = leg_x - r_x*i_x                       of phase x: voltage minus resistive drop, times clocks
     lambda_alpha += 2*s_a - s_b - s_c
     lambda_beta  += sqrt(3)*(s_b - s_c)              start: lambda = (psi_start, 0), the rotor's flux at the angle zero
 
@@ -62,7 +62,7 @@ def reference(v, state):
 
 
 def bound(_v, _state):
-    """Of one step: half an LSB of three drops, of the difference, of sqrt(3) at the largest difference, of the output."""
+    """Of a step: half an LSB of three drops, of the difference, of sqrt(3) at the largest difference, of the output."""
     drops, widest = 4 * MOTOR_LEG.lsb, 2.0 ** (D_W - 1) * MOTOR_LEG.lsb * 2**DROP_D
     beta = 2 * (drops + MOTOR_LEG.lsb * 2**DROP_D) + SQRT3.fmt.lsb / 2 * widest
     return {
@@ -72,7 +72,7 @@ def bound(_v, _state):
 
 
 def stimuli(_rng, _config):
-    """From a start with either sign into both limits of the state in each component; drops that reach the leg's limit."""
+    """From a start with either sign into both limits of the state, each component; drops that reach the leg's limit."""
     still = {p.name: 0 for p in BLOCK.inputs + BLOCK.registers}
     rows = []
     for psi in (FLUX.hi, FLUX.lo, 0):

@@ -50,7 +50,7 @@ def reference(v, _state):
         x = v["stiffness"] * v[f"i_{name}"]
         result[f"high_{name}"] = min(u_dc - min(max(x, -drops[1]), drops[0]), top)
         result[f"low_{name}"] = -min(max(x, -drops[0]), drops[1])
-        result[f"off_{name}"] = min(min(max(u_dc / 2 - x, -drops[1]), u_dc + drops[1]), top)
+        result[f"off_{name}"] = min(max(u_dc / 2 - x, -drops[1]), u_dc + drops[1], top)
     return result
 
 

@@ -25,9 +25,7 @@ from golden_model.motor.motor_angle import F_BITS, POINTS
 STEP = 17  # clocks
 STARTING = 12  # steps
 REGISTERS = tuple(
-    port
-    for block in (motor_legs, motor_flux, motor_unsaturated, motor_shaft)
-    for port in block.BLOCK.registers
+    port for block in (motor_legs, motor_flux, motor_unsaturated, motor_shaft) for port in block.BLOCK.registers
 )
 Registers = namedtuple("Registers", [p.name for p in REGISTERS])
 flux_step, unsaturated_step, current_step = motor_flux.step, motor_unsaturated.step, motor_current.step
@@ -38,7 +36,7 @@ LAST_POINT = POINTS - 1
 
 
 class Tables(NamedTuple):
-    """Words of the block RAMs: int64 arrays; map of 64 x 64 points (d axis first), tables of POINTS words over a turn."""
+    """Words of the block RAMs, int64: map of 64 x 64 points (d axis first), tables of POINTS words over a turn."""
 
     map_d: np.ndarray
     map_q: np.ndarray
@@ -48,7 +46,7 @@ class Tables(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What a step reads at its tick, and for each leg the clocks of the step before with the upper, the lower gate on."""
+    """What a step reads at its tick; for each leg the clocks of the step before with its upper or its lower gate on."""
 
     u_dc: int = 0
     load: int = 0
@@ -188,4 +186,3 @@ def no_tables() -> Tables:
     """Zeros: a linear machine without harmonics."""
     line = np.zeros(POINTS, np.int64)
     return Tables(np.zeros((64, 64), np.int64), np.zeros((64, 64), np.int64), line, line.copy(), line.copy())
-

@@ -5,8 +5,8 @@
     omega += k_j*(net -+ coulomb);  theta += omega;  theta_e = pole_pairs*theta
 
 At standstill Coulomb friction holds the shaft while it exceeds ``net``, and it never turns the shaft back: a speed that
-changes its sign is zero for a step.  ``hold`` = 1: the speed is ``omega_set``, as on a dynamometer.  ``start``: angle and
-speed begin at zero.
+changes its sign is zero for a step.  ``hold`` = 1: the speed is ``omega_set``, as on a dynamometer.  ``start``: angle
+and speed begin at zero.
 Formats: torques S(1,23), the base is that of flux times current; k_j U(-31,56), viscous U(12,5), both for a step.
 Speed S(-13,56) in turns a step, angle U(0,56) in turns, exact; outputs cut (floor).  Products half up, sums saturate.
 """
