@@ -5,7 +5,7 @@
     OWN    a control of its own for each, of the same gains and references: the whole drive
 
 A free shaft with the plant's gates would be a synchronous machine at the mains: lightly loaded it hunts, and a
-difference grows however small it was.  The control is field-oriented, in floating point, with an angle that is led along
+difference grows however small it was.  The control is field-oriented, in floating point, with an angle led along
 the reference, so that neither drifts.  A PWM period is a whole number of the motor's steps.
 """
 

@@ -774,6 +774,13 @@ package fluxproof_pkg is
   constant MOTOR_LEGS_LATENCY : positive := 9;
   constant MOTOR_LEGS_DROP_X : natural := 2;
 
+  -- motor_sensors: docs/hil.md: sensors
+  constant MOTOR_SENSORS_LATENCY : positive := 11;
+  constant MOTOR_SENSORS_DROP_BUS : natural := 6;
+  constant MOTOR_SENSORS_DROP_NOISE : natural := 8;
+  constant MOTOR_SENSORS_DROP_GAIN : natural := 20;
+  constant MOTOR_SENSORS_SEED : natural := 625341585;
+
   -- motor_shaft: docs/hil.md: shaft
   constant MOTOR_SHAFT_LATENCY : positive := 13;
   constant MOTOR_SHAFT_DROP_TORQUE : natural := 16;
