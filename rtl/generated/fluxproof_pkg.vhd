@@ -759,6 +759,9 @@ package fluxproof_pkg is
   constant MOTOR_CURRENT_HALF_SQRT3 : signed(17 downto 0) := to_signed(113512, 18);  -- 0.866025404 as S(0,17), signed for the multiplier
   constant MOTOR_CURRENT_DROP_BETA : natural := 17;
 
+  -- motor_encoder: docs/hil.md: sensors
+  constant MOTOR_ENCODER_LATENCY : positive := 3;
+
   -- motor_flux: docs/hil.md: d lambda/dt = u - R i
   constant MOTOR_FLUX_LATENCY : positive := 10;
   constant MOTOR_FLUX_DROP_RI : natural := 15;
