@@ -8,7 +8,7 @@
 The flux's base is a third of 2**16 clocks times the voltage's base, so the integration of a voltage takes no factor and
 rounds nothing in alpha.  The zero sequence of the legs cancels.
 Formats: leg S(6,22), r U(3,21) for the whole step, i PU; the drop is rounded half up to 22 fraction bits; s_b - s_c
-is rounded half up to 17, sqrt(3) S(1,16), their product to the 38 of the state; the outputs half up to FLUX.
+is rounded half up to 17, sqrt(3) S(1,16), their product to the 38 of the state; the outputs are cut to FLUX.
 Sums saturate.
 """
 
@@ -18,7 +18,7 @@ from typing import NamedTuple
 from golden_model.block import Block, Const, Port
 from golden_model.common.multiply_add import multiply_subtract
 from golden_model.fixed import Format, round_half_up, round_sat, saturate
-from golden_model.formats import BIT, FLUX, FLUX_W, MOTOR_FLUX, MOTOR_LEG, PU
+from golden_model.formats import BIT, FLUX, MOTOR_FLUX, MOTOR_LEG, PU
 from golden_model.kernel import kernel
 
 CLOCKS_BITS = 16  # the flux's base is a third of 2**CLOCKS_BITS clocks times the voltage's
@@ -48,7 +48,7 @@ def step(state, leg_a, leg_b, leg_c, i_a, i_b, i_c, start, r_a, r_b, r_c, psi_st
     beta = saturate(state.beta + round_half_up(difference * BY_SQRT3, DROP_BETA), STATE_W)
     if start:
         alpha, beta = psi_start << DROP_OUT, 0
-    return State(alpha, beta), (round_sat(alpha, DROP_OUT, FLUX_W), round_sat(beta, DROP_OUT, FLUX_W))
+    return State(alpha, beta), (alpha >> DROP_OUT, beta >> DROP_OUT)
 
 
 def reference(v, state):
@@ -107,8 +107,8 @@ BLOCK = Block(
         Port("lambda_beta", FLUX, doc="flux linkage, beta"),
     ),
     state=State(),
-    latency=10,
-    interval=11,
+    latency=9,
+    interval=10,
     constants={
         "DROP_RI": DROP_RI,
         "DROP_D": DROP_D,

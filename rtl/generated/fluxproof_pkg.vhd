@@ -763,7 +763,7 @@ package fluxproof_pkg is
   constant MOTOR_ENCODER_LATENCY : positive := 3;
 
   -- motor_flux: docs/hil.md: d lambda/dt = u - R i
-  constant MOTOR_FLUX_LATENCY : positive := 10;
+  constant MOTOR_FLUX_LATENCY : positive := 9;
   constant MOTOR_FLUX_DROP_RI : natural := 15;
   constant MOTOR_FLUX_DROP_D : natural := 5;
   constant MOTOR_FLUX_DROP_BETA : natural := 11;

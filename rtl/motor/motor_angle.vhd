@@ -61,8 +61,10 @@ architecture rtl of motor_angle is
   signal prod_c_3   : signed(33 downto 0);
   signal fine_s_4   : signed(FINE_W - 1 downto 0);
   signal fine_c_4   : signed(FINE_W - 1 downto 0);
-  signal sin_4      : signed(FINE_W downto 0);
-  signal cos_4      : signed(FINE_W downto 0);
+  signal size_s_4   : signed(FINE_W - 1 downto 0);
+  signal size_c_4   : signed(FINE_W - 1 downto 0);
+  signal minus_s_4  : std_logic;
+  signal minus_c_4  : std_logic;
   signal before_3   : signed(MOTOR_WAVE_W - 1 downto 0);
   signal after_3    : signed(MOTOR_WAVE_W - 1 downto 0);
   signal before_4   : signed(MOTOR_WAVE_W - 1 downto 0);
@@ -85,10 +87,10 @@ begin
   low_0      <= theta_e(LOW + DELTA_BITS - 1 downto LOW);
 
   -- A quarter turn swaps sine and cosine and inverts the sign of the cosine, a half turn inverts both signs
-  sin_4 <= resize(fine_c_4, FINE_W + 1) when quadrant_0 = 1 else -resize(fine_s_4, FINE_W + 1) when quadrant_0 = 2 else
-           -resize(fine_c_4, FINE_W + 1) when quadrant_0 = 3 else resize(fine_s_4, FINE_W + 1);
-  cos_4 <= -resize(fine_s_4, FINE_W + 1) when quadrant_0 = 1 else -resize(fine_c_4, FINE_W + 1) when quadrant_0 = 2 else
-           resize(fine_s_4, FINE_W + 1) when quadrant_0 = 3 else resize(fine_c_4, FINE_W + 1);
+  size_s_4  <= fine_c_4 when quadrant_0(0) = '1' else fine_s_4;
+  size_c_4  <= fine_s_4 when quadrant_0(0) = '1' else fine_c_4;
+  minus_s_4 <= quadrant_0(1);
+  minus_c_4 <= quadrant_0(1) xor quadrant_0(0);
 
   -- The table that enters the interpolation: d, q, cogging
   before_3 <= wave_q_0 when valid(4) = '1' else cog_0 when valid(5) = '1' else wave_d_0;
@@ -135,8 +137,8 @@ begin
 
       -- Stage 5: into the quadrant, narrowed
       if valid(4) = '1' then
-        sin_theta <= round_sat(sin_4, MOTOR_ANGLE_DROP_TRIG, MOTOR_TRIG_W);
-        cos_theta <= round_sat(cos_4, MOTOR_ANGLE_DROP_TRIG, MOTOR_TRIG_W);
+        sin_theta <= saturate(turned_half_up(size_s_4, minus_s_4, MOTOR_ANGLE_DROP_TRIG), MOTOR_TRIG_W);
+        cos_theta <= saturate(turned_half_up(size_c_4, minus_c_4, MOTOR_ANGLE_DROP_TRIG), MOTOR_TRIG_W);
       end if;
 
       -- Stages 8 to 10: one table after the other

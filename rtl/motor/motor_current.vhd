@@ -52,6 +52,10 @@ architecture rtl of motor_current is
   constant SUM_W     : positive := 26;
 
   signal valid      : std_logic_vector(0 to LATENCY);
+  signal m_00_3     : signed(POINT_W - 1 downto 0);
+  signal m_01_3     : signed(POINT_W - 1 downto 0);
+  signal m_10_3     : signed(POINT_W - 1 downto 0);
+  signal m_11_3     : signed(POINT_W - 1 downto 0);
   signal rise_0_4   : signed(POINT_W downto 0);
   signal rise_1_4   : signed(POINT_W downto 0);
   signal base_0_4   : signed(BETWEEN_W - 1 downto 0);
@@ -82,6 +86,12 @@ begin
   by_q     <= signed('0' & f_q);
   by_d     <= signed('0' & f_d);
 
+  -- The axis that enters
+  m_00_3 <= d_00 when valid(3) = '1' else q_00;
+  m_01_3 <= d_01 when valid(3) = '1' else q_01;
+  m_10_3 <= d_10 when valid(3) = '1' else q_10;
+  m_11_3 <= d_11 when valid(3) = '1' else q_11;
+
   -- Stages 5 to 7: lo and hi of d, then of q
   first_row : entity work.multiply_add
     generic map (DROP => MOTOR_CURRENT_DROP_FIRST)
@@ -111,16 +121,10 @@ begin
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
       -- Stage 4: the rises along the columns, of d, then of q
-      rise_0_4 <= resize(q_01, POINT_W + 1) - q_00;
-      rise_1_4 <= resize(q_11, POINT_W + 1) - q_10;
-      base_0_4 <= shift_left(resize(q_00, BETWEEN_W), MOTOR_CURRENT_FINER);
-      base_1_4 <= shift_left(resize(q_10, BETWEEN_W), MOTOR_CURRENT_FINER);
-      if valid(3) = '1' then
-        rise_0_4 <= resize(d_01, POINT_W + 1) - d_00;
-        rise_1_4 <= resize(d_11, POINT_W + 1) - d_10;
-        base_0_4 <= shift_left(resize(d_00, BETWEEN_W), MOTOR_CURRENT_FINER);
-        base_1_4 <= shift_left(resize(d_10, BETWEEN_W), MOTOR_CURRENT_FINER);
-      end if;
+      rise_0_4 <= difference(m_01_3, m_00_3);
+      rise_1_4 <= difference(m_11_3, m_10_3);
+      base_0_4 <= shift_left(resize(m_00_3, BETWEEN_W), MOTOR_CURRENT_FINER);
+      base_1_4 <= shift_left(resize(m_10_3, BETWEEN_W), MOTOR_CURRENT_FINER);
 
       -- Stage 8: the rise across the rows
       lo_8   <= lo_7;

@@ -3,8 +3,8 @@
 --   s_x = leg_x - r_x*i_x                     phases a, b, c one after the other through one multiplier
 --   lambda_alpha += 2*s_a - s_b - s_c;  lambda_beta += sqrt(3)*(s_b - s_c);  start: (psi_start, 0)
 -- Formats: leg S(6,22), r U(3,21), i PU; state S(1,38), whose LSB is that of a leg: alpha is exact; outputs FLUX.
--- Latency: 10.  Interval: 11.
--- Rounding: each product, s_b - s_c to 17 fraction bits, and the outputs half up.  Sums saturate.
+-- Latency: 9.  Interval: 10.
+-- Rounding: each product, s_b - s_c to 17 fraction bits half up; the outputs are cut.  Sums saturate.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -103,12 +103,6 @@ begin
         end if;
       end if;
 
-      -- Stage 10: narrowed
-      if valid(9) = '1' then
-        lambda_alpha <= round_sat(alpha_9, MOTOR_FLUX_DROP_OUT, FLUX_W);
-        lambda_beta  <= round_sat(beta_9, MOTOR_FLUX_DROP_OUT, FLUX_W);
-      end if;
-
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
         alpha_9             <= (others => '0');
@@ -117,6 +111,8 @@ begin
     end if;
   end process;
 
-  out_valid <= valid(LATENCY);
+  out_valid    <= valid(LATENCY);
+  lambda_alpha <= alpha_9(MOTOR_FLUX_W - 1 downto MOTOR_FLUX_DROP_OUT);
+  lambda_beta  <= beta_9(MOTOR_FLUX_W - 1 downto MOTOR_FLUX_DROP_OUT);
 
 end architecture rtl;

@@ -46,22 +46,30 @@ architecture rtl of motor_legs is
 
   signal valid       : std_logic_vector(0 to LATENCY);
   signal by_i        : signed(17 downto 0);
-  signal switch_v    : signed(22 downto 0);
   signal diode_v     : signed(22 downto 0);
   signal i_0         : signed(PU_W - 1 downto 0);
   signal x_3         : signed(X_W - 1 downto 0);
   signal x_4         : signed(X_W - 1 downto 0);
   signal free_4      : signed(X_W downto 0);
-  signal with_high_5 : signed(22 downto 0);
-  signal with_low_5  : signed(22 downto 0);
+  signal minus_5     : std_logic;
+  signal with_high_5 : unsigned(21 downto 0);
+  signal with_low_5  : unsigned(21 downto 0);
   signal off_5       : signed(V_W downto 0);
   signal high_6      : signed(V_W - 1 downto 0);
   signal low_6       : signed(V_W - 1 downto 0);
   signal off_6       : signed(V_W - 1 downto 0);
+
+  -- The smaller of a size and a drop
+  function least (size : unsigned; drop : unsigned) return unsigned is
+  begin
+    if size > drop then
+      return drop;
+    end if;
+    return resize(size, drop'length);
+  end function;
 begin
   valid(0) <= in_valid;
   by_i     <= signed('0' & stiffness);
-  switch_v <= signed('0' & v_switch);
   diode_v  <= signed('0' & v_diode);
 
   -- The leg that enters: a, then b, then c
@@ -73,6 +81,8 @@ begin
     port map (clk => clk, a => by_i, b => i_0, c => NOTHING, y => x_3, limited => open);
 
   process (clk)
+    variable with_high : signed(V_W downto 0);
+    variable sum       : signed(V_W + 1 downto 0);
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
@@ -81,15 +91,23 @@ begin
       x_4    <= x_3;
       free_4 <= shift_right(resize(u_dc, X_W + 1), 1) - x_3;
 
-      -- Stage 5: the limits of the devices
-      with_high_5 <= resize(clamp(x_4, -diode_v, switch_v), 23);
-      with_low_5  <= resize(clamp(x_4, -switch_v, diode_v), 23);
-      off_5       <= resize(clamp(free_4, -diode_v, resize(u_dc, V_W + 1) + diode_v), V_W + 1);
+      -- Stage 5: the size of x within the drops of the devices;  the voltage of a leg that is off within the rails
+      minus_5 <= x_4(x_4'high);
+      if x_4(x_4'high) = '1' then
+        with_high_5 <= least(magnitude(x_4), v_diode);
+        with_low_5  <= least(magnitude(x_4), v_switch);
+      else
+        with_high_5 <= least(magnitude(x_4), v_switch);
+        with_low_5  <= least(magnitude(x_4), v_diode);
+      end if;
+      off_5 <= resize(clamp(free_4, -diode_v, resize(u_dc, V_W + 1) + diode_v), V_W + 1);
 
       -- Stages 6 to 9: the leg's three voltages
-      high_6 <= saturate(resize(u_dc, V_W + 1) - with_high_5, V_W);
-      low_6  <= -resize(with_low_5, V_W);
-      off_6  <= saturate(off_5, V_W);
+      with_high := resize(signed('0' & with_high_5), V_W + 1);
+      sum       := (resize(u_dc, V_W + 1) & '1') + ((with_high xor not minus_5) & not minus_5);
+      high_6    <= saturate(sum(V_W + 1 downto 1), V_W);
+      low_6     <= negated(resize(signed('0' & with_low_5), V_W), not minus_5);
+      off_6     <= saturate(off_5, V_W);
       if valid(6) = '1' then
         high_a <= high_6;
         low_a  <= low_6;

@@ -3,7 +3,7 @@
 -- Only wiring: a step of STEP clocks begins with tick, each block starts when the one before it is done; what a block
 -- reads is the newest that is there.  Which step that is of: golden_model/motor/motor_model.py.
 -- Formats: those of the blocks; docs/hil.md.
--- Latency: 41 clocks from tick to the currents of the fluxes at tick, 54 to the angle.  Interval: STEP.
+-- Latency: 40 clocks from tick to the currents of the fluxes at tick, 53 to the angle.  Interval: STEP.
 -- Rounding: none.
 -- table_select: 0 the map, d in the upper half of a word, address row and column; 1 harmonic fluxes; 2 cogging.
 

@@ -58,20 +58,26 @@ architecture rtl of motor_shaft is
   signal torque_4   : signed(FLUX_W - 1 downto 0);
   signal rest_4     : signed(NET_W - 1 downto 0);
   signal net_5      : signed(FLUX_W - 1 downto 0);
-  signal forward_5  : std_logic;
+  signal rests      : std_logic;
   signal back_5     : std_logic;
+  signal held_5     : std_logic;
+  signal less_5     : signed(FLUX_W + 1 downto 0);
   signal friction   : signed(23 downto 0);
   signal moving_6   : signed(FLUX_W - 1 downto 0);
   signal by_hi_7    : signed(FLUX_W + 17 downto 0);
   signal by_lo_7    : signed(FLUX_W + LOW downto 0);
   signal sum_8      : signed(FLUX_W + 18 + LOW downto 0);
   signal omega_9    : signed(OMEGA_W downto 0);
+  signal stops_9    : std_logic;
   signal omega_10   : signed(OMEGA_W - 1 downto 0);  -- state
   signal theta_11   : unsigned(THETA_W - 1 downto 0);  -- state
   signal theta_m_12 : unsigned(MOTOR_ANGLE_W - 1 downto 0);
   signal product_12 : unsigned(MOTOR_ANGLE_W + 4 downto 0);
 begin
   valid(0)   <= in_valid;
+  -- Friction stops a shaft whose speed changes its sign
+  stops_9    <= (or coulomb) and not rests and (omega_10(omega_10'high) xor omega_9(omega_9'high));
+
   by_viscous <= signed('0' & viscous);
   friction   <= signed('0' & coulomb);
   speed      <= omega_10(OMEGA_W - 1 downto MOTOR_SHAFT_DROP_OMEGA);
@@ -86,8 +92,11 @@ begin
     port map (clk => clk, a => speed, b => by_viscous, c => NOTHING, y => drag_3, limited => open);
 
   -- Which way the shaft moves, or would move: at standstill the torque decides, if it exceeds the friction
-  forward_5 <= '1' when omega_10 > 0 or (omega_10 = 0 and net_5 > friction) else '0';
-  back_5    <= '1' when omega_10 < 0 or (omega_10 = 0 and net_5 < -friction) else '0';
+  rests     <= nor omega_10;
+  back_5    <= net_5(net_5'high) when rests = '1' else omega_10(omega_10'high);
+  -- net -+ friction with one sum: the carry that a complement needs comes from the bit below
+  less_5    <= (resize(net_5, FLUX_W + 1) & '1') + ((resize(friction, FLUX_W + 1) xor not back_5) & not back_5);
+  held_5    <= rests and ((less_5(less_5'high) xor back_5) or nor less_5(FLUX_W + 1 downto 1));
 
   process (clk)
     variable following : signed(OMEGA_W downto 0);
@@ -107,11 +116,9 @@ begin
       net_5 <= saturate(torque_4 + rest_4, FLUX_W);
 
       -- Stage 6: what friction leaves of it
-      moving_6 <= (others => '0');
-      if forward_5 = '1' then
-        moving_6 <= saturate(resize(net_5, FLUX_W + 1) - friction, FLUX_W);
-      elsif back_5 = '1' then
-        moving_6 <= saturate(resize(net_5, FLUX_W + 1) + friction, FLUX_W);
+      moving_6 <= saturate(less_5(FLUX_W + 1 downto 1), FLUX_W);
+      if held_5 = '1' then
+        moving_6 <= (others => '0');
       end if;
 
       -- Stages 7, 8: k_j*moving in two parts, and the half that rounds it
@@ -126,7 +133,7 @@ begin
       -- Stage 10: friction stops at zero
       if valid(9) = '1' then
         following := omega_9;
-        if coulomb /= 0 and ((omega_10 > 0 and omega_9 < 0) or (omega_10 < 0 and omega_9 > 0)) then
+        if stops_9 = '1' then
           following := (others => '0');
         end if;
         omega_10 <= saturate(following, OMEGA_W);
