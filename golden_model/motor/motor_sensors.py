@@ -105,7 +105,7 @@ def bound(v, _state):
 
 
 def stimuli(_rng, _config):
-    """Both rails and the middle of each channel, ties of the code's rounding, an angle at its wrap, the largest noise."""
+    """Rails and middle of each channel, ties of the code's rounding, an angle at its wrap, the largest noise."""
     still = {p.name: 0 for p in BLOCK.inputs + BLOCK.registers}
     one = {f"scale_{x}": 1 << 20 for x in "abcu"}
     rows = []
