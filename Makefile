@@ -26,7 +26,7 @@ unexport PYTHONHOME
 
 PYTHON_RUN := .venv/bin/python
 
-.PHONY: help setup generate test slow demo papers bench blind fleet sensitivity real mishaps compare timeline mutate verilog synth ecp5 lint registers package prove faults rough board fuzz lock clean distclean
+.PHONY: help setup generate test slow demo papers hil bench blind fleet sensitivity real mishaps compare timeline mutate verilog synth ecp5 lint registers package prove faults rough board fuzz lock clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -85,6 +85,9 @@ timeline: setup ## draw the timeline of one control period
 
 board: setup ## measure the figures of encoders, converters and the closed loop of a board
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.board $(ARGS)
+
+hil: setup ## measure the motor in the FPGA: against the plant, RTL against model, size (ARGS='--only plant --seconds 1')
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.hil $(ARGS)
 
 faults: setup ## inject faults: sensors, bus, strobes, registers; RTL against golden core
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.faults $(ARGS)

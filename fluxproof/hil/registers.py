@@ -25,9 +25,9 @@ from golden_model.motor.motor_model import STEP, Registers, Tables
 
 PORTS = {p.name: p for p in motor_model.REGISTERS}
 ROOM = 1.5  # largest flux and voltage per unit: the formats end at 2
-# Loop gain of a leg's stiffness: i(n + 1) = i(n) - RINGING*i(n - 3) decays to 0.86 in a step.  27/256 would just not
+# Loop gain of a leg's stiffness: i(n + 1) = i(n) - RINGING*i(n - 3) decays to 0.89 in a step.  27/256 would just not
 # overshoot, 2*sin(pi/14) = 0.445 would not decay; what is left of a blocked current goes with its inverse.
-RINGING = 27 / 128
+RINGING = 1 / 4
 MAP = 64  # points of the map along each axis, a 32nd of the current's base apart
 
 
