@@ -87,6 +87,7 @@ architecture rtl of fluxproof_hil is
   signal trigger    : std_logic;
   signal sample     : sample_t;
   signal entered    : std_logic;
+  signal ready      : std_logic;
   signal held       : std_logic;
   signal converted  : std_logic;
   signal i_a_1      : signed(PU_W - 1 downto 0);
@@ -114,6 +115,13 @@ begin
         i_c_1     <= motor_i_c;
         u_dc_1    <= motor_u_dc;
         theta_m_1 <= motor_theta_m;
+      end if;
+
+      if ready = '0' then
+        i_a_1     <= (others => '0');
+        i_b_1     <= (others => '0');
+        i_c_1     <= (others => '0');
+        theta_m_1 <= (others => '0');
       end if;
 
       -- The sample of the core
@@ -154,8 +162,9 @@ begin
       k_j => motor_k_j, viscous => motor_viscous, coulomb => motor_coulomb, pole_pairs => motor_pole_pairs,
       hold => motor_hold, omega_set => motor_omega_set, table_write => motor_table_write,
       table_select => motor_table_select, table_at => motor_table_at, table_word => motor_table_word, tick => open,
-      i_a => motor_i_a, i_b => motor_i_b, i_c => motor_i_c, torque => motor_torque, omega_m => motor_omega_m,
-      theta_m => motor_theta_m, theta_e => motor_theta_e, shoot_through => motor_shoot_through
+      ready => ready, i_a => motor_i_a, i_b => motor_i_b, i_c => motor_i_c, torque => motor_torque,
+      omega_m => motor_omega_m, theta_m => motor_theta_m, theta_e => motor_theta_e,
+      shoot_through => motor_shoot_through
     );
 
   sensors : entity work.motor_sensors

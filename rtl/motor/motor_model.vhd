@@ -5,6 +5,7 @@
 -- Formats: those of the blocks; docs/hil.md.
 -- Latency: 40 clocks from tick to the currents of the fluxes at tick, 53 to the angle.  Interval: STEP.
 -- Rounding: none.
+-- ready: the rotor is free; before, currents and angle may be those of before the reset.
 -- table_select: 0 the map, d in the upper half of a word, address row and column; 1 harmonic fluxes; 2 cogging.
 
 library ieee;
@@ -43,6 +44,7 @@ entity motor_model is
     table_at      : in  unsigned(11 downto 0);
     table_word    : in  unsigned(35 downto 0);
     tick          : out std_logic;
+    ready         : out std_logic;
     i_a           : out signed(PU_W - 1 downto 0);
     i_b           : out signed(PU_W - 1 downto 0);
     i_c           : out signed(PU_W - 1 downto 0);
@@ -113,6 +115,7 @@ architecture rtl of motor_model is
 begin
   first <= '1' when count = 0 else '0';
   tick  <= first;
+  ready <= '1' when starting = 0 else '0';
 
   -- The clocks of a step, and what a step takes at its tick
   process (clk)

@@ -32,17 +32,18 @@ class Compared:
         return np.argwhere(self.rtl != self.golden)
 
 
-def write_tables(core: VerilatedCore, tables: Tables) -> None:
-    """All words of the tables through the motor's port."""
+def write_tables(core: VerilatedCore, tables: Tables, prefix: str = "") -> None:
+    """All words of the tables through the motor's port, whose names begin with ``prefix``."""
     words = [
         *((0, 64 * r + c, tables.map_d[r, c], tables.map_q[r, c]) for r in range(64) for c in range(64)),
         *((1, k, tables.wave_d[k], tables.wave_q[k]) for k in range(len(tables.wave_d))),
         *((2, k, 0, tables.cogging[k]) for k in range(len(tables.cogging))),
     ]
     columns = np.array([(s, at, (int(d) % HALF_WORD) << 18 | int(q) % HALF_WORD) for s, at, d, q in words], np.int64).T
-    given = dict(zip(("table_select", "table_at", "table_word"), columns, strict=True))
-    core.play(given | {"table_write": np.ones(len(words), np.int64)}, ["tick"])
-    core.set("table_write", 0)
+    names = [f"{prefix}{name}" for name in ("table_select", "table_at", "table_word")]
+    write = f"{prefix}table_write"
+    core.play(dict(zip(names, columns, strict=True)) | {write: np.ones(len(words), np.int64)}, [core.outputs[0]])
+    core.set(write, 0)
 
 
 def gates(rng: np.random.Generator, clocks: int) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Core and motor in one (`fluxproof_hil`): the RTL alone in Verilator, its gates at every clock against the golden models.
+
+Python sets the references and a load step and only reads: the loop is closed in the RTL.  The golden loop runs beside it.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from fluxproof.checkout import DRIVES
+from fluxproof.cosim.closed_loop import gate_words
+from fluxproof.cosim.flat import FLAT
+from fluxproof.cosim.golden_clock import GoldenClock
+from fluxproof.cosim.verilated import VerilatedCore
+from fluxproof.hil.beside_plant import follow
+from fluxproof.hil.registers import Scale, motor_registers, motor_scale, motor_tables
+from golden_model import fluxproof
+from golden_model.drive import Drive, load
+from golden_model.motor import motor_model, motor_sensors, motor_shaft
+from golden_model.motor.motor_model import STEP
+from golden_model.registers import RegisterSet, registers
+from golden_model.units import from_si
+from studies.hil.drive import SERVO, SWITCHES
+from studies.hil.equal import write_tables
+from studies.hil.figure import least, most
+
+CHAIN, SHAFT = 40, 53  # clocks from a tick to its currents, to its angle
+CONVERSION = 13  # clocks from sample_trigger to sample_valid
+SPEED_RAD_S, LOAD_NM = 100.0, 0.1
+PERIODS = 300
+
+
+class Parts(NamedTuple):
+    """Both drives' registers, those of the core, the motor and its sensors."""
+
+    drive: Drive
+    core: RegisterSet
+    scale: Scale
+    motor: motor_model.Registers
+    tables: motor_model.Tables
+    sensors: motor_sensors.Registers
+
+
+def parts() -> Parts:
+    """The drive file's core and sensors with the motor of the study."""
+    drive = load(DRIVES / "servo_24v.toml")
+    of_core, sensors = registers(drive), drive.sensors
+    scale = motor_scale(SERVO, drive.inverter.dc_bus_v, sensors.current_range_a, drive.core.clock_hz)
+    unit = 1 << motor_sensors.SENSOR_GAIN.frac_bits
+    bus = round(2 * scale.voltage_v / sensors.u_dc_range_v * unit)
+    scales = {"scale_a": unit, "scale_b": unit, "scale_c": unit, "scale_u": bus}
+    still = dict.fromkeys(motor_sensors.Registers._fields, 0) | scales | {"noise_i": 20}
+    motor, tables = motor_registers(scale, SERVO, SWITCHES), motor_tables(scale, SERVO)
+    return Parts(drive, of_core, scale, motor, tables, motor_sensors.Registers(**still))
+
+
+class GoldenMotor:
+    """The golden motor clock by clock, from the gates that it is given."""
+
+    def __init__(self, of: Parts):
+        self.of, self.ticks, self.word = of, 0, 0
+        self.u_dc = of.scale.u_dc(of.drive.inverter.dc_bus_v)
+        self.state, _ = self._tick(motor_model.State(), 0)
+        self.random = motor_sensors.State()
+
+    def _tick(self, state, load_code):
+        inputs = motor_model.Inputs(u_dc=self.u_dc, load=load_code)
+        return motor_model.step(state, inputs, self.of.motor, self.of.tables, STEP)
+
+    def advance(self, words: np.ndarray, clock: int, load_code: int) -> None:
+        """Up to the last tick at or before ``clock``; ``words``: the gates of every clock so far."""
+        steps = clock // STEP - self.ticks
+        part = words[self.ticks * STEP : (self.ticks + steps) * STEP]
+        at = np.flatnonzero(np.diff(part, prepend=self.word))
+        events = (at.astype(np.int64), (part[at] << 6) | (63 & ~part[at]), len(at))
+        self.state, self.word = follow(
+            self.state, self.word, events, steps, self.u_dc, load_code, self.of.motor, self.of.tables
+        )
+        self.ticks += steps
+
+    def codes(self, clock: int, load_code: int) -> tuple[int, ...]:
+        """What the sensors say of the currents and the angle that stand at the outputs at ``clock``."""
+        s = self.state
+        chain = (s.chain_1, s.chain_2, s.chain_3, s.chain_4)[self.ticks - (clock - CHAIN) // STEP]
+        theta = s.of_shaft.theta >> motor_shaft.DROP_THETA
+        if self.ticks - (clock - SHAFT) // STEP == 3:  # the shaft's next step is done already
+            theta = self._tick(s, load_code)[1].theta_m
+        seen = motor_sensors.Inputs(chain.i_a, chain.i_b, chain.i_c, self.u_dc, theta)
+        config = self.of.core.config
+        self.random, codes = motor_sensors.step(
+            self.random, seen, self.of.sensors, config.adc_bits, config.position_bits
+        )
+        return codes
+
+
+@dataclass(frozen=True)
+class Run:
+    """Gate words after every clock; values of each sample that the core shows."""
+
+    words: np.ndarray
+    observed: list[dict[str, int]]
+    seconds: float = 0.0
+
+
+def references(of: Parts) -> dict[str, int]:
+    """Speed control from the start, a winding temperature that is not measured."""
+    omega = from_si("omega_ref", SPEED_RAD_S * of.drive.machine.pole_pairs, of.drive)
+    return {"omega_ref": int(omega), "i_d_ref": 0, "i_q_ext": 0, "speed_mode": 1, "temp_winding": 0, "temp_valid": 0}
+
+
+def golden_run(of: Parts, periods: int, load_at: int) -> Run:
+    """Core and motor as models; the load from clock ``load_at``, a tick."""
+    core, motor = GoldenClock(of.core.values, of.core.config), GoldenMotor(of)
+    words, observed = np.zeros(1, np.int64), []
+    sample, loads, seen = None, (0, of.scale.load(LOAD_NM)), []
+    for _ in range(periods):
+        made = [] if sample is None else [core.advance(CONVERSION, enable=1)]
+        made.append(core.advance(4 * of.core.config.carrier_half, sample, until_trigger=True, enable=1))
+        if core.observed is not None:
+            observed.append(core.observed._asdict())
+        seen.append(gate_words(np.concatenate(made)))
+        words = np.concatenate([words, seen[-1]])
+        if motor.ticks * STEP < load_at <= core.clock:
+            motor.advance(words, load_at - 1, loads[0])
+        now = loads[core.clock >= load_at]
+        motor.advance(words, core.clock, now)
+        sample = dict(zip(fluxproof.Sample._fields, motor.codes(core.clock, now), strict=False))
+        sample |= references(of) | {"clear_faults": 0}
+    return Run(words[1:], observed)
+
+
+def rtl_run(of: Parts, golden: Run, load_at: int) -> Run:
+    """The RTL for as many clocks; observed values are those at the golden run's triggers."""
+    config = of.core.config
+    generics = {"ADC_BITS": config.adc_bits, "POSITION_BITS": config.position_bits, "CARRIER_HALF": config.carrier_half}
+    core = VerilatedCore(generics, top=f"fluxproof_hil{FLAT}")
+    core.set_many(of.core.values._asdict())
+    core.set_many({f"motor_{name}": value for name, value in {**of.motor._asdict(), **of.sensors._asdict()}.items()})
+    core.set("motor_u_dc", of.scale.u_dc(of.drive.inverter.dc_bus_v))
+    core.set_many({name if name in core.inputs else f"{name}_in": v for name, v in references(of).items()})
+    write_tables(core, of.tables, "motor_")
+    core.set("enable", 1)
+    core.reset()
+    began, names = time.perf_counter(), ("gate_high", "gate_low", "sample_trigger")
+    before = core.trace(load_at, names)
+    core.set("motor_load", of.scale.load(LOAD_NM))
+    after = core.trace(len(golden.words) - load_at, names)
+    seconds = time.perf_counter() - began
+    rows = np.concatenate([before, after])
+    return Run(rows[:, 0] + 8 * rows[:, 1], [core.get_many(golden.observed[-1])], seconds)
+
+
+def compare(periods: int) -> tuple[Run, Run]:
+    """(golden, RTL) of the same closed loop, a load step in the middle."""
+    of = parts()
+    load_at = periods // 2 * 2 * of.core.config.carrier_half // STEP * STEP
+    golden = golden_run(of, periods, load_at)
+    return golden, rtl_run(of, golden, load_at)
+
+
+def figures(_options) -> list[dict]:
+    golden, rtl = compare(PERIODS)
+    wrong = int((golden.words != rtl.words).sum()) + int(golden.observed[-1] != rtl.observed[-1])
+    return [
+        least("closed loop of core and motor in the RTL", PERIODS, PERIODS, "periods"),
+        most("its differences from the golden models, gates at every clock", wrong, 0, "differences"),
+        least("its rate in Verilator", PERIODS / rtl.seconds, 240, "periods/s"),
+    ]
