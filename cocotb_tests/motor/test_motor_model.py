@@ -28,7 +28,7 @@ def test_motor_in_verilator():
 
 @pytest.mark.slow
 def test_core_and_motor_in_one():
-    """The loop closed in the RTL alone: gates at every clock and the last sample's values, a load step in the middle."""
+    """The loop closed in the RTL alone: gates at every clock, the last sample's values, a load step in the middle."""
     skip_without_ghdl5()
     golden, rtl = closed_loop.compare(40)
     wrong = np.flatnonzero(golden.words != rtl.words)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Core and motor in one (`fluxproof_hil`): the RTL alone in Verilator, its gates at every clock against the golden models.
+"""Core and motor in one (`fluxproof_hil`): the RTL alone in Verilator, its gates at every clock against the models.
 
-Python sets the references and a load step and only reads: the loop is closed in the RTL.  The golden loop runs beside it.
+Python sets the references and a load step and only reads: the loop is closed in the RTL.  The golden loop runs beside.
 """
 
 from __future__ import annotations
