@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the core and a motor in one: the core's gates drive the motor, the motor's sensors are the core's samples.
 -- Only wiring.  At sample_trigger currents, bus and angle are held, as converters do; their codes enter the core 13
--- clocks later.  Of reference only the references and flags are used, its codes come from the sensors.
+-- clocks later.  Of given only references and flags are used, the codes come from the sensors.
 -- Formats: those of the blocks; docs/hil.md.
 -- Latency: 13 clocks from sample_trigger to sample_valid.  Interval: a PWM period, or half of one.
 -- Rounding: none.
@@ -21,7 +21,7 @@ entity fluxproof_hil is
   port (
     clk                 : in  std_logic;
     rst                 : in  std_logic;
-    reference           : in  sample_t;
+    given               : in  sample_t;
     settings            : in  settings_t;
     enable              : in  std_logic;
     trip                : in  std_logic;
@@ -127,7 +127,7 @@ begin
       -- The sample of the core
       entered <= converted;
       if converted = '1' then
-        sample               <= reference;
+        sample               <= given;
         sample.adc_a         <= resize(code_a, CODE_W);
         sample.adc_b         <= resize(code_b, CODE_W);
         sample.adc_c         <= resize(code_c, CODE_W);
@@ -143,7 +143,9 @@ begin
   end process;
 
   core : entity work.fluxproof
-    generic map (ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS, CARRIER_HALF => CARRIER_HALF, ESTIMATORS => ESTIMATORS)
+    generic map (
+      ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS, CARRIER_HALF => CARRIER_HALF, ESTIMATORS => ESTIMATORS
+    )
     port map (
       clk => clk, rst => rst, sample_valid => entered, sample => sample, settings => settings, enable => enable,
       trip => trip, clear_trip => clear_trip, host_write => host_write, gate_high => gate_high, gate_low => gate_low,

@@ -2,7 +2,7 @@
 -- Purpose: what follows from the rotor's angle: sine, cosine, harmonic fluxes, their slopes, cogging torque.
 --   theta_e = quadrant + (address + 1/2)/4096 + delta;  sin = S + delta*C,  cos = C - delta*S
 --   h = w_0 + (w_1 - w_0)*f;  slope = (w_1 - w_0)*1024/(2*pi): three tables, one interpolation after the other
--- Formats: angles U(0,25), sine and cosine S(0,17) from the table of sincos, delta S(-10,24); words S(-2,19), slopes PU.
+-- Formats: angles U(0,25), sine and cosine S(0,17) by the table of sincos, delta S(-10,24); words S(-2,19), slopes PU.
 -- Latency: 10; the words of the tables are needed 3 clocks after the angles.  Interval: 8.
 -- Rounding: products of the sine floored to 22 fraction bits, all else half up; sine, cosine and slopes saturate.
 
@@ -37,12 +37,12 @@ entity motor_angle is
 end entity motor_angle;
 
 architecture rtl of motor_angle is
-  constant LATENCY    : positive := MOTOR_ANGLE_LATENCY;
-  constant DELTA_BITS : positive := MOTOR_ANGLE_DELTA_BITS;
-  constant F_BITS     : positive := MOTOR_ANGLE_F_BITS;
-  constant LOW        : natural  := MOTOR_ANGLE_W - 2 - SINCOS_ADDRESS_BITS - DELTA_BITS;
-  constant FINE_W     : positive := 24;  -- S(1,22)
-  constant SUM_W      : positive := FINE_W + MOTOR_ANGLE_DROP_PROD;
+  constant LATENCY    : positive           := MOTOR_ANGLE_LATENCY;
+  constant DELTA_BITS : positive           := MOTOR_ANGLE_DELTA_BITS;
+  constant F_BITS     : positive           := MOTOR_ANGLE_F_BITS;
+  constant LOW        : natural            := MOTOR_ANGLE_W - 2 - SINCOS_ADDRESS_BITS - DELTA_BITS;
+  constant FINE_W     : positive           := 24;  -- S(1,22)
+  constant SUM_W      : positive           := FINE_W + MOTOR_ANGLE_DROP_PROD;
   constant NOTHING    : signed(0 downto 0) := "0";
 
   signal valid      : std_logic_vector(0 to LATENCY);

@@ -52,6 +52,7 @@ architecture rtl of motor_inverter is
   signal leg         : sums_t;
   signal both        : std_logic;
 begin
+
   process (clk)
     variable u    : signed(MOTOR_VOLTAGE_W - 1 downto 0);
     variable base : signed(MOTOR_LEG_W - 1 downto 0);

@@ -39,9 +39,9 @@ entity motor_legs is
 end entity motor_legs;
 
 architecture rtl of motor_legs is
-  constant LATENCY : positive := MOTOR_LEGS_LATENCY;
-  constant V_W     : positive := MOTOR_VOLTAGE_W;
-  constant X_W     : positive := 26;
+  constant LATENCY : positive           := MOTOR_LEGS_LATENCY;
+  constant V_W     : positive           := MOTOR_VOLTAGE_W;
+  constant X_W     : positive           := 26;
   constant NOTHING : signed(0 downto 0) := "0";
 
   signal valid       : std_logic_vector(0 to LATENCY);

@@ -33,14 +33,15 @@ architecture rtl of motor_map is
 begin
 
   -- Table k has the rows whose parity is bit 1 of k and the columns whose parity is bit 0
+
   quarters : for k in 0 to 3 generate
-    constant PARITY : unsigned(1 downto 0) := to_unsigned(k, 2);
-    signal read_at : unsigned(9 downto 0);
-    signal mine    : std_logic;
-    signal rows    : unsigned(6 downto 0);
-    signal columns : unsigned(6 downto 0);
+    constant PARITY  : unsigned(1 downto 0) := to_unsigned(k, 2);
+    signal   read_at : unsigned(9 downto 0);
+    signal   mine    : std_logic;
+    signal   rows    : unsigned(6 downto 0);
+    signal   columns : unsigned(6 downto 0);
   begin
-    -- The first of both rows of the cell that has this parity: an even one is the next if the cell begins with an odd one
+    -- Of the cell's two rows that of this parity: an even one is the next if the cell begins with an odd one
     rows    <= resize(row, 7) + 1 when PARITY(1) = '0' else resize(row, 7);
     columns <= resize(column, 7) + 1 when PARITY(0) = '0' else resize(column, 7);
     read_at <= rows(5 downto 1) & columns(5 downto 1);

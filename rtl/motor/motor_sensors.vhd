@@ -48,11 +48,11 @@ entity motor_sensors is
 end entity motor_sensors;
 
 architecture rtl of motor_sensors is
-  constant LATENCY : positive := MOTOR_SENSORS_LATENCY;
-  constant Y_W     : positive := 22;
-  constant DROP    : positive := PU_W - 1 - ADC_BITS;
+  constant LATENCY : positive              := MOTOR_SENSORS_LATENCY;
+  constant Y_W     : positive              := 22;
+  constant DROP    : positive              := PU_W - 1 - ADC_BITS;
   constant SEED    : unsigned(31 downto 0) := to_unsigned(MOTOR_SENSORS_SEED, 32);
-  constant TOP     : signed(Y_W downto 0) := to_signed(2 ** ADC_BITS - 1, Y_W + 1);
+  constant TOP     : signed(Y_W downto 0)  := to_signed(2 ** ADC_BITS - 1, Y_W + 1);
 
   signal valid   : std_logic_vector(0 to LATENCY);
   signal random  : unsigned(31 downto 0);  -- state

@@ -40,13 +40,13 @@ entity motor_shaft is
 end entity motor_shaft;
 
 architecture rtl of motor_shaft is
-  constant LATENCY : positive := MOTOR_SHAFT_LATENCY;
-  constant LOW     : positive := MOTOR_SHAFT_LOW_BITS;
-  constant OMEGA_W : positive := MOTOR_SHAFT_OMEGA_W;
-  constant THETA_W : positive := MOTOR_SHAFT_THETA_W;
-  constant NET_W   : positive := FLUX_W + 4;
+  constant LATENCY : positive           := MOTOR_SHAFT_LATENCY;
+  constant LOW     : positive           := MOTOR_SHAFT_LOW_BITS;
+  constant OMEGA_W : positive           := MOTOR_SHAFT_OMEGA_W;
+  constant THETA_W : positive           := MOTOR_SHAFT_THETA_W;
+  constant NET_W   : positive           := FLUX_W + 4;
   constant NOTHING : signed(0 downto 0) := "0";
-  constant MINUS   : std_logic := '1';
+  constant MINUS   : std_logic          := '1';
 
   signal valid      : std_logic_vector(0 to LATENCY);
   signal start_1    : std_logic;
@@ -74,9 +74,9 @@ architecture rtl of motor_shaft is
   signal theta_m_12 : unsigned(MOTOR_ANGLE_W - 1 downto 0);
   signal product_12 : unsigned(MOTOR_ANGLE_W + 4 downto 0);
 begin
-  valid(0)   <= in_valid;
+  valid(0) <= in_valid;
   -- Friction stops a shaft whose speed changes its sign
-  stops_9    <= (or coulomb) and not rests and (omega_10(omega_10'high) xor omega_9(omega_9'high));
+  stops_9 <= (or coulomb) and not rests and (omega_10(omega_10'high) xor omega_9(omega_9'high));
 
   by_viscous <= signed('0' & viscous);
   friction   <= signed('0' & coulomb);
@@ -92,11 +92,11 @@ begin
     port map (clk => clk, a => speed, b => by_viscous, c => NOTHING, y => drag_3, limited => open);
 
   -- Which way the shaft moves, or would move: at standstill the torque decides, if it exceeds the friction
-  rests     <= nor omega_10;
-  back_5    <= net_5(net_5'high) when rests = '1' else omega_10(omega_10'high);
+  rests  <= nor omega_10;
+  back_5 <= net_5(net_5'high) when rests = '1' else omega_10(omega_10'high);
   -- net -+ friction with one sum: the carry that a complement needs comes from the bit below
-  less_5    <= (resize(net_5, FLUX_W + 1) & '1') + ((resize(friction, FLUX_W + 1) xor not back_5) & not back_5);
-  held_5    <= rests and ((less_5(less_5'high) xor back_5) or nor less_5(FLUX_W + 1 downto 1));
+  less_5 <= (resize(net_5, FLUX_W + 1) & '1') + ((resize(friction, FLUX_W + 1) xor not back_5) & not back_5);
+  held_5 <= rests and ((less_5(less_5'high) xor back_5) or nor less_5(FLUX_W + 1 downto 1));
 
   process (clk)
     variable following : signed(OMEGA_W downto 0);

@@ -27,9 +27,12 @@ end entity motor_table;
 architecture rtl of motor_table is
   type ram_t is array (0 to 2 ** ADDRESS_BITS - 1) of unsigned(WIDTH - 1 downto 0);
 
-  signal ram    : ram_t := (others => (others => '0'));
+  -- vsg_off signal_007
+  signal ram    : ram_t := (others => (others => '0'));  -- a block RAM has a content after configuration
+  -- vsg_on signal_007
   signal word_1 : unsigned(WIDTH - 1 downto 0);
 begin
+
   process (clk)
   begin
     if rising_edge(clk) then

@@ -43,12 +43,12 @@ begin
   at_m <= theta_m(MOTOR_ANGLE_W - 1 downto MOTOR_ANGLE_F_BITS);
 
   halves : for k in 0 to 1 generate
-    constant ODD : std_logic := to_unsigned(k, 1)(0);
-    signal next_e   : unsigned(9 downto 0);
-    signal next_m   : unsigned(9 downto 0);
-    signal mine     : std_logic;
-    signal write_e  : std_logic;
-    signal write_m  : std_logic;
+    constant ODD     : std_logic := to_unsigned(k, 1)(0);
+    signal   next_e  : unsigned(9 downto 0);
+    signal   next_m  : unsigned(9 downto 0);
+    signal   mine    : std_logic;
+    signal   write_e : std_logic;
+    signal   write_m : std_logic;
   begin
     next_e  <= at_e + 1 when ODD = '0' else at_e;
     next_m  <= at_m + 1 when ODD = '0' else at_m;

@@ -23,7 +23,7 @@ PARTS = {"plant": plant.figures, "size": size.figures, "equal": equal.figures, "
 
 
 def main(arguments: list[str]) -> int:
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", maxsplit=1)[0])
     parser.add_argument("--only", choices=PARTS, nargs="+", default=list(PARTS), help="these parts")
     parser.add_argument("--seconds", type=float, default=10.0, help="length of the ride beside the plant")
     options = parser.parse_args(arguments)
