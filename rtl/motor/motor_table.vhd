@@ -28,7 +28,7 @@ architecture rtl of motor_table is
   type ram_t is array (0 to 2 ** ADDRESS_BITS - 1) of unsigned(WIDTH - 1 downto 0);
 
   -- vsg_off signal_007
-  signal ram    : ram_t := (others => (others => '0'));  -- a block RAM has a content after configuration
+  signal memory : ram_t := (others => (others => '0'));  -- a block RAM has a content after configuration
   -- vsg_on signal_007
   signal word_1 : unsigned(WIDTH - 1 downto 0);
 begin
@@ -37,9 +37,9 @@ begin
   begin
     if rising_edge(clk) then
       if write = '1' then
-        ram(to_integer(write_at)) <= write_word;
+        memory(to_integer(write_at)) <= write_word;
       end if;
-      word_1 <= ram(to_integer(read_at));
+      word_1 <= memory(to_integer(read_at));
       word   <= word_1;
     end if;
   end process;
