@@ -14,6 +14,7 @@ from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.balance.parts import sound
 from fluxproof.diagnosis.balance.slow_view import SlowView, slow_view
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.conventions.restated import as_read
 from fluxproof.diagnosis.decide.conclude import conclude
 from fluxproof.diagnosis.decide.decision import Decision
 from fluxproof.diagnosis.decide.interpretation import restated, under
@@ -27,7 +28,6 @@ from fluxproof.diagnosis.inference.posterior import Posterior
 from fluxproof.diagnosis.inference.search import search
 from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.interpret.judge import preferred
-from fluxproof.diagnosis.loading.restated import as_read
 from fluxproof.diagnosis.plan.next_recording import next_recording
 from fluxproof.diagnosis.plan.planned import Planned
 from fluxproof.diagnosis.suspects import SUSPECTS

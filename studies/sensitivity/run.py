@@ -9,6 +9,7 @@ from pathlib import Path
 from fluxproof.diagnosis.balance.cells import voltage_rms
 from fluxproof.diagnosis.balance.parts import sound
 from fluxproof.diagnosis.catalogue import CATALOGUE
+from fluxproof.diagnosis.conventions.restated import as_read
 from fluxproof.diagnosis.decide.conclude import conclude
 from fluxproof.diagnosis.decide.interpretation import under
 from fluxproof.diagnosis.decide.rules import judge
@@ -19,7 +20,6 @@ from fluxproof.diagnosis.inference.search import search
 from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.interpret.judge import preferred
 from fluxproof.diagnosis.loading.load import load_recording
-from fluxproof.diagnosis.loading.restated import as_read
 from fluxproof.diagnosis.physics import explain, rows_of, single_point, view_and_held
 from studies.sensitivity.steps import Steps, recorded, varied
 

@@ -17,6 +17,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from fluxproof.diagnosis.conventions.exchanges import EXACT
 from fluxproof.diagnosis.ground.arrays import Complex, Real
 from fluxproof.diagnosis.ground.machine import flux_linkage, mean_emf, steady_voltage
 from fluxproof.diagnosis.ground.nominal import Machine
@@ -26,7 +27,6 @@ MOST_ROWS = 5000
 FIT = 0.25  # misfit over voltage: any real effect is smaller at speed
 BETTER = 0.3  # a change is accepted if the misfit falls below this share
 LEAST_ROWS, LEAST_OF_TABLE = 20, 6  # fewer fit by chance with some change
-EXACT = 1e-9  # of the currents: of their sum where one of them is computed from the other two
 LEAST_POINTS, SAME = 3, 0.1  # of dq values: operating points that are so far apart, of rated current and top speed
 
 

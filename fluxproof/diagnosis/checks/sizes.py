@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.conventions.units import IN_A_DUTY, KELVIN, OF_BUS_VOLTAGE, OF_CURRENT, OF_VOLTAGE
 from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "units"
@@ -66,7 +67,7 @@ def _winding(recording) -> None:
     if temp is None or not 250.0 < np.median(temp) < 500.0:
         return
     if not _documented(recording, "temp_winding"):
-        _convert(recording, ("temp_winding",), 1.0, "kelvin", -273.15)
+        _convert(recording, ("temp_winding",), 1.0, "kelvin", KELVIN)
         return
     message = f"the median of temp_winding is {np.median(temp):.0f} degC as documented, which looks like kelvin"
     recording.problems.append(Problem("unit", message, "temp_winding", 0, len(recording), "not used"))
@@ -86,10 +87,11 @@ def _currents(recording, machine) -> None:
         message = f"reaches {large[current]:.4g} A and {voltage} {_size(recording[voltage]):.3g} V: they look swapped"
         _refuse(recording, current, f"{message}; exchange their names in [columns]")
         return
-    if max(large.values()) / 1000.0 <= PLAUSIBLE * rated and not _documented(recording, *large):
-        # A unit applies to a sensor board: to all currents of a frame, unless the others differ in magnitude.
-        _convert(recording, tuple(large), 1e-3, "mA")
-        return
+    for unit, factor in OF_CURRENT.items():
+        if max(large.values()) * factor <= PLAUSIBLE * rated and not _documented(recording, *large):
+            # A unit applies to a sensor board: to all currents of a frame, unless the others differ in magnitude.
+            _convert(recording, tuple(large), factor, unit)
+            return
     name = max(large, key=large.__getitem__)
     times = f"{large[name] / rated:.0f} times rated_current_a = {rated:g} A"
     _refuse(recording, name, f"reaches {large[name]:.4g} A, {times}", large)
@@ -112,7 +114,7 @@ def _duties(recording) -> None:
     low = min(float(np.min(recording[name])) for name in names)
     high = max(float(np.max(recording[name])) for name in names)
     mean = float(np.mean([np.mean(recording[name]) for name in names]))
-    for factor, unit in ((100.0, "percent"), (1000.0, "permille")):
+    for unit, factor in IN_A_DUTY.items():
         if (
             low >= -ROUNDING * factor
             and 0.1 * factor < high <= factor * (1 + ROUNDING)
@@ -139,7 +141,7 @@ def _bus(recording, nominal_v) -> None:
     if "u_dc" not in recording.columns:
         return
     ratio = float(np.median(recording["u_dc"])) / nominal_v
-    for factor, unit in ((1e-3, "mV"), (1e3, "kV")):
+    for unit, factor in OF_BUS_VOLTAGE.items():
         if abs(ratio * factor - 1.0) < 0.3 and not _documented(recording, "u_dc"):
             _convert(recording, ("u_dc",), factor, unit)
             return
@@ -153,8 +155,9 @@ def _voltages(recording, nominal) -> None:
     names = tuple(name for name in ("u_d_ref", "u_q_ref") if name in recording.columns)
     size = max((_size(recording[name]) for name in names), default=0.0)
     if size > MUCH * nominal_v:
-        if size / 1000.0 < nominal_v and not _documented(recording, *names):
-            _convert(recording, names, 1e-3, "mV")
+        unit, factor = next(((u, f) for u, f in OF_VOLTAGE.items() if size * f < nominal_v), (None, 1.0))
+        if unit and not _documented(recording, *names):
+            _convert(recording, names, factor, unit)
         else:
             _refuse(recording, names[0], f"voltages reach {size:.4g} V with a bus of {nominal_v:g} V", names)
     if names and not set(names) & set(recording.meta.get("of_bus", ())):

@@ -32,7 +32,7 @@ def check(recording, nominal) -> None:
         recording.columns[column] = -recording[column]
         recording.problems.append(Problem("sign", message, column, 0, n, "corrected"))
         return
-    recording.meta["angle_speed"] = ratio  # tells other pole pairs (loading/restated.py)
+    recording.meta["angle_speed"] = ratio  # tells other pole pairs (conventions/restated.py)
     message = f"the angle advances {ratio:.3g} times as fast as the recorded speed"
     if not confirmed and not 1.0 / WRONG < ratio < WRONG:
         message += ": omega_e is electrical; name its unit in [columns], or correct pole_pairs"

@@ -15,10 +15,10 @@ import numpy as np
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
 from fluxproof.diagnosis.checks.balance import BETTER, FIT, FastRows, SteadyRows, discriminates, misfit, rows_of
 from fluxproof.diagnosis.checks.rival_readings import CLEAR, best_reading, misfit_of
+from fluxproof.diagnosis.conventions.units import angle_units, speed_units
 from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "units"
-TURN = 2.0 * math.pi
 CLOSE = 0.05
 LEAST_BITS = 9  # of an encoder: 0 to 360 may be degrees
 
@@ -40,30 +40,6 @@ def check(recording, nominal) -> None:
         recording.problems.append(Problem("unit", f"the speed is in {unit}", "omega_e", 0, n, "converted"))
 
 
-def _angle_units(p, bits=None) -> dict[str, float]:
-    units = {"degrees": math.pi / 180, "turns": TURN} | ({f"codes of {bits} bits": TURN / 2**bits} if bits else {})
-    if p > 1:
-        units |= {
-            "rad of the shaft": p,
-            "degrees of the shaft": p * math.pi / 180,
-            "turns of the shaft": p * TURN,
-        }
-    return units
-
-
-def _speed_units(p) -> dict[str, float]:
-    units = {"electrical rpm": TURN / 60, "electrical Hz": TURN}
-    if p > 1:
-        units |= {
-            "rad/s of the shaft": p,
-            "rpm of the shaft": p * TURN / 60,
-            "turns/s of the shaft": p * TURN,
-        }
-    else:
-        units = {"rpm": TURN / 60, "turns/s": TURN}
-    return units
-
-
 def _angle_unit(recording, nominal, p):
     """(unit, factor) of an angle that is not in electrical rad, else None."""
     if "theta_e" not in recording.columns or recording.slow:
@@ -74,7 +50,7 @@ def _angle_unit(recording, nominal, p):
     rows = rows_of(recording, nominal)
     if without_speed:
         del recording.columns["omega_e"]
-    units = _angle_units(p, _bits(recording["theta_e"]))
+    units = angle_units(p, _bits(recording["theta_e"]))
     if isinstance(rows, FastRows) and discriminates(rows):
         as_is = _best_direction(rows, 1.0)
         if as_is <= FIT:
@@ -117,7 +93,7 @@ def _speed_unit(recording, nominal, p):
     """(unit, factor) of a speed that is not in electrical rad/s, a Problem if nobody can tell, else None."""
     if "omega_e" not in recording.columns or "omega_e" in recording.meta.get("stated_units", ()):
         return None
-    units = _speed_units(p)
+    units = speed_units(p)
     if not recording.slow and "theta_e" in recording.columns:
         period = nominal.sample_time_s
         ratio = angle_speed_ratio(recording, period)

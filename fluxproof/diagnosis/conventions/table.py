@@ -2,7 +2,7 @@
 """The mistakes that people make with drive recordings and data sheets, one entry each.
 
 A new entry is a new line; of entries that leave the same balance the first is reported first.  Units that only the
-numbers reveal (degrees, percent, mA, rpm) and exchanged phases are corrected by the checks.
+numbers reveal stand in units.py, exchanged columns and signs in exchanges.py.
 
 Sources of the factors: amplitude-invariant against power-invariant Clarke, sqrt(3/2); peak against rms, sqrt(2); phase
 against line-to-line voltage, sqrt(3), and resistance or inductance between two terminals, 2; a
@@ -115,6 +115,11 @@ READINGS = (
 )  # fmt: skip
 
 
+def says_pole_pairs(right, stated) -> str:
+    """The clause about wrong pole pairs, whether the file was read again or only the balance tells them."""
+    return f"the machine has {right} pole pair{'s' * (right != 1)}, not {stated} as in the drive file"
+
+
 def pole_pairs_for(nominal) -> list[Reading]:
     """Readings with other pole pairs: a digit beside the right one, or poles in place of pairs."""
     stated = nominal.machine.pole_pairs
@@ -122,7 +127,7 @@ def pole_pairs_for(nominal) -> list[Reading]:
     return [
         Reading(
             f"pole_pairs {n}", "machine.pole_pairs",
-            f"the machine has {n} pole pair{'s' * (n != 1)}, not {stated} as in the drive file",
+            says_pole_pairs(n, stated),
             pole_pairs=n, speed=n / stated,
         )
         for n in sorted(near) if n > 0

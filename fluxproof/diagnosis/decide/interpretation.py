@@ -81,7 +81,7 @@ def _imitated(fit: Fit, level: float) -> float:
 def restated(decision: Decision, changed) -> Decision:
     """The decision with a key of the drive file that had to be changed for the recording to be usable at all.
 
-    changed: loading.restated.Restated, or None.
+    changed: conventions.restated.Restated, or None.
     """
     if changed is None or decision.basis is None:
         return decision

@@ -19,6 +19,7 @@ import numpy as np
 
 from fluxproof.diagnosis.checks import check_recording
 from fluxproof.diagnosis.checks.missing import OPTIONAL
+from fluxproof.diagnosis.conventions.restated import alternatives
 from fluxproof.diagnosis.ground.recording import Recording, RecordingError
 from fluxproof.diagnosis.ingest.analyser import dq_of_analyser
 from fluxproof.diagnosis.ingest.columns import Plan, canonical, plan_columns
@@ -27,7 +28,7 @@ from fluxproof.diagnosis.ingest.dyno import dq_of_dyno
 from fluxproof.diagnosis.ingest.emf import emf_rows
 from fluxproof.diagnosis.ingest.points import as_table, is_table
 from fluxproof.diagnosis.ingest.units import conversion
-from fluxproof.diagnosis.loading.restated import alternatives, doubtful, fits
+from fluxproof.diagnosis.loading.reread import doubtful, fits
 from fluxproof.diagnosis.readers import read_table
 from fluxproof.diagnosis.readers.table import Table, shown
 
