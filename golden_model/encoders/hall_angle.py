@@ -108,7 +108,18 @@ def step(state, step_up, step_down, skipped, theta_hall, sample, time_w):
 @kernel
 def rest(state, clocks, time_w):
     """The state after so many clocks without an edge or a sample, the engine idle."""
-    return state._replace(since=min(state.since + clocks, (1 << time_w) - 1))
+    s = state
+    since = min(s.since + clocks, (1 << time_w) - 1)
+    return State(
+        s.seen, s.forward, s.known, since, s.sector_time, s.middle, s.clock, s.remainder, s.divisor, s.part, s.place,
+        s.backward, s.begin, s.theta,
+    )  # fmt: skip
+
+
+@kernel
+def state_of(v):
+    """The state of an array that holds its fields."""
+    return State(v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], v[9], v[10], v[11], v[12], v[13])
 
 
 def _turning(rng, clocks, gaps, still):
