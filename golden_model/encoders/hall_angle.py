@@ -8,15 +8,15 @@ t is the time since the last edge, T that of the last sector, d = 1 or -1 the di
     two edges in one direction, T below the longest time:  place = t/T - 1/2 up to t = T,  then (T/t)/2
     else, the speed is not known:                          place = (t/T - 1)/2 up to t = T,  then 0
 
-So the angle passes from one edge to the next where the speed is constant, goes back to the middle where the next edge is
-late, and is the middle at rest.  After a reversal the shaft is at the edge it has passed before: the angle goes on from
+So the angle passes from one edge to the next where the speed is constant, goes back to the middle where the next edge
+is late, and is the middle at rest.  After a reversal the shaft is at the edge it has passed before: the angle goes on from
 this edge, towards the middle.  There T is the longer one of the last sector and the time since the edge before, a
 quarter of the longest time at most; as long an edge after a rest may take.  Before the first edge, and after a change
 by more than one sector, the angle is the middle.
 Formats: angles TURN, times TIME_W bits, saturating; t/T has QUOTIENT_W bits.  Rounding: the quotient is cut, the angle
 half up; it wraps.
-A sample takes ``TAKES`` clocks from ``sample`` to the angle, one bit of the quotient a clock; a ``sample`` before that is
-ignored.
+A sample takes ``TAKES`` clocks from ``sample`` to the angle, one bit of the quotient a clock; a ``sample`` before that
+is ignored.
 """
 
 from typing import NamedTuple

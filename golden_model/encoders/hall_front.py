@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Three Hall sensors from their pins to a code and a speed: filters, hall_decoder, hall_angle and edge_timer, wired.
 
-Nothing is computed here.  The upper bits of hall_angle's angle are the code of a sensor alone, with ``pole_pairs`` 1; the
-speed is that between two sectors, with ``k_edge`` for 6 counts a turn, and comes after the code.
+Nothing is computed here.  The upper bits of hall_angle's angle are the code of a sensor alone, with ``pole_pairs`` 1;
+the speed is that between two sectors, with ``k_edge`` for 6 counts a turn, and comes after the code.
 """
 
 from collections import namedtuple
