@@ -13,13 +13,18 @@ import pytest
 from cocotb_tests.support.drives import PAPER
 from fluxproof.checkout import DRIVES
 from fluxproof.command import main
+from fluxproof.cosim import golden_loop
+from fluxproof.cosim.driven_plant import Scenario
+from fluxproof.cosim.sensor_edges import edges_of
 from fluxproof.simulate import scene
 from fluxproof.simulate.margins import current_loop, margins, speed_loop, turning_current_loop
 from fluxproof.simulate.session import simulate
+from golden_model.board_registers import core_changes
 from golden_model.drive import load
 from golden_model.drive_keys import DriveError
 from golden_model.registers import registers
 from golden_model.supply import Supply
+from golden_model.units import from_si
 
 DRIVE = load(PAPER)
 
@@ -290,3 +295,24 @@ def test_heavy_drive_stays_at_low_speeds():
     heavy = scene.main_scene(changed("machine", inertia_kgm2=0.16))
     assert heavy.shortened and not scene.main_scene(DRIVE).shortened
     assert heavy.stage("speed step").reference < 0.2 * scene.main_scene(DRIVE).stage("speed step").reference
+
+
+def test_torque_with_hall_sensors():
+    """At 100 rpm and 5 A the angle between the edges leaves little ripple; at rest the shaft holds against 5 A."""
+    drive = load(DRIVES / "hub_36v.toml")
+    settings = registers(drive)
+    settings = settings._replace(values=settings.values._replace(**core_changes(drive)))
+    n, load_nm = 24_000, 5.0 * scene.torque_per_a(drive)
+    zeros, ones = np.zeros(n, np.int64), np.ones(n, np.int64)
+
+    def plant(rpm: float, load_nm: np.ndarray) -> dict[str, np.ndarray]:
+        omega_m = rpm * 2.0 * np.pi / 60.0
+        reference = ones * from_si("omega_ref", omega_m * drive.machine.pole_pairs, drive)
+        given = Scenario(reference, load_nm, np.full(n, 36.0), zeros, zeros, ones, ones, omega_m=omega_m)
+        edges = edges_of(drive)
+        return golden_loop.simulate(drive, settings, given, dead_time_s=drive.inverter.dead_time_s, edges=edges).plant
+
+    torque = plant(100.0, np.full(n, load_nm))["torque"][16_000:]
+    assert np.ptp(torque) < 0.03 * torque.mean()
+    speed = plant(0.0, load_nm * (np.arange(n) > 4000))["omega_m"]
+    assert np.ptp(speed[-8000:]) * 30.0 / np.pi < 1.0

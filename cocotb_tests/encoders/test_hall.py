@@ -8,7 +8,10 @@ import pytest
 
 from cocotb_tests.support.peripherals.golden_player import GoldenPlayer
 from cocotb_tests.support.peripherals.incremental_model import Incremental, wandering
-from golden_model.encoders import edge_timer, hall_decoder, incremental_encoder, turn_counter
+from fluxproof.checkout import DRIVES
+from fluxproof.cosim.sensor_edges import edges_of, hall_code
+from golden_model.drive import load
+from golden_model.encoders import edge_timer, hall_angle, hall_decoder, incremental_encoder, turn_counter
 
 DELAY = 1  # clocks from the sensors to theta_hall
 
@@ -92,3 +95,49 @@ def test_speed_of_hall_steps():
     wanted = 2 * np.pi * speed * clock_hz / omega_base
     omega = out["omega_me"][np.flatnonzero(out["omega_valid"])][5:] / 2**16
     assert np.abs(omega / wanted - 1).max() < 1e-3
+
+
+def angle_at_samples(turns: np.ndarray, every: int) -> tuple[np.ndarray, np.ndarray]:
+    """(clocks of the samples, hall_angle's error there in turns), sectors from hall_decoder."""
+    steps = player().play({**sensors(turns), "settled": np.ones(len(turns), np.int64)})
+    sample = (np.arange(len(turns)) % every == every - 1).astype(np.int64)
+    inputs = {name: steps[name] for name in ("step_up", "step_down", "skipped", "theta_hall")}
+    out = GoldenPlayer(hall_angle.BLOCK, hall_angle.BLOCK.configs[0], {}).play({**inputs, "sample": sample})
+    at = np.flatnonzero(sample)[:-1]
+    return at, (out["theta"][at + hall_angle.TAKES] / 2**18 - turns[at] + 0.5) % 1.0 - 0.5
+
+
+@pytest.mark.parametrize("speed", [2e-5, -2e-5])
+def test_angle_between_hall_edges(speed):
+    """From the third edge on the error is a hundredth of a sector; the middle alone is off by half of one."""
+    at, error = angle_at_samples(0.02 + speed * np.arange(200_000), 500)
+    whole = at * abs(speed) > 3 / 6
+    assert np.abs(error[whole]).max() < 0.01 / 6 and np.abs(error).max() <= 1 / 6
+
+
+def test_angle_of_hall_sensors_stays_in_the_sector_and_rests_at_its_middle():
+    """However the shaft turns, the error is below a sector; at rest it goes back to the middle."""
+    moving = np.cumsum(np.repeat(np.random.default_rng(5).normal(0.0, 2e-5, 60), 2000))
+    rest = np.full(400_000, moving[-1])
+    at, error = angle_at_samples(np.concatenate([moving, rest]), 400)
+    assert np.abs(error).max() <= 1 / 6 + 1e-4 and np.abs(error[at < len(moving)]).mean() < 1 / 12
+    middle = (np.floor(moving[-1] * 6) + 0.5) / 6
+    assert abs(error[-1] - (middle - moving[-1])) < 0.1 / 6
+
+
+def test_simulated_hall_code_is_that_of_the_block():
+    """cosim.sensor_edges gives hall_angle its edges at their clocks and leaps over the clocks between."""
+    drive, every, clocks = load(DRIVES / "hub_36v.toml"), 4000, 400_000
+    edges, seconds = edges_of(drive), np.arange(clocks) / drive.core.clock_hz
+    per_s = 20.0 * np.sign(np.sin(2.0 * np.pi * 300.0 * seconds) + 0.4)  # electrical, with reversals at samples
+    per_s = np.repeat(per_s[::every], every)
+    turns = 0.01 + np.concatenate([[0.0], np.cumsum(per_s[:-1]) / drive.core.clock_hz])
+    steps = player().play({**sensors(turns), "settled": np.ones(clocks, np.int64)})
+    sample = (np.arange(clocks) % every == 0).astype(np.int64)
+    inputs = {name: steps[name] for name in ("step_up", "step_down", "skipped", "theta_hall")}
+    block = GoldenPlayer(hall_angle.BLOCK, hall_angle.BLOCK.configs[0], {}).play({**inputs, "sample": sample})
+    pairs, bits = drive.machine.pole_pairs, 14
+    for at in range(every, clocks - every, every):
+        code = hall_code(edges, turns[at] / pairs, per_s[at - 1] / pairs, at / drive.core.clock_hz, bits)
+        off = (code - (int(block["theta"][at + hall_angle.TAKES]) >> 18 - bits) + 2 ** (bits - 1)) % 2**bits
+        assert abs(off - 2 ** (bits - 1)) <= 2 ** (bits - 8)  # the decoder's clocks

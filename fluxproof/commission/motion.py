@@ -38,7 +38,6 @@ SPREAD = 0.1  # largest rms of a held speed, of itself
 PREDICTED = 0.04  # largest error of the point that was not fitted, of its voltage
 LARGEST_ERROR_DEG = 15.0  # electrical, that alignment may have left
 SIGMA_PSI, SIGMA_K = 0.01, 0.1  # largest uncertainties
-COARSE_PSI = 0.05  # with Hall sensors alone, whose steps the current regulators follow late
 # Means of hundreds of samples have no noise: what the equation leaves is the model's error, and every point of a sense
 # repeats it.  Of the eight points two count.
 REPEATED = 4.0
@@ -94,7 +93,6 @@ def inertia(session: Session) -> Step:
     sigma = sigma * math.sqrt((1.0 + like) / (1.0 - like))  # residuals of neighbours resemble each other
     k, b, c = (found / scale)[-3:]
     s_k, s_b, s_c = (sigma / scale)[-3:]
-    k, s_k = k / s.turning_part, s_k / s.turning_part  # of a current that turns with the rotor
     if k <= 0.0:
         raise Refusal(
             f"a positive torque current turns the shaft backward ({k:.3g} rad/s2 per A): the encoder's offset or "
@@ -207,32 +205,19 @@ def _held(s: Session, speed: float) -> np.ndarray:
     return np.array([float(getattr(seen, n)[whole].mean()) for n in ("omega_me", "i_d", "i_q", "u_d", "u_q")])
 
 
-def _current_turns(s: Session, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(speed by which L*i counts across the current, and along it); ``w``: that of the flux linkage in the mean.
-
-    At the next Hall sector a current that is held in the frame of the code jumps by 60 degrees.  In the new frame it
-    was i*exp(-j*60 deg) and becomes i again: L*i*(1/2 + j*sqrt(3)/2) a sector, which takes pi/3 over the speed.
-    """
-    if not s.coarse:
-        return w, np.zeros_like(w)
-    return w * math.sqrt(0.75), np.abs(w) / 2.0
-
-
 def judge(s: Session, first: Step, points: list[np.ndarray], v_1: float) -> Step:
     """The regression; the last point is predicted, not fitted."""
     m = s.drive.machine
     omega, i_d, i_q, u_d, u_q = np.array(points).T
-    w_e, cosine = 2.0 / s.t_s * np.sin(omega * s.t_s / 2.0) * s.turning_part, np.cos(omega * s.t_s / 2.0)
-    w_l, jump = _current_turns(s, w_e)
+    w_e, cosine = 2.0 / s.t_s * np.sin(omega * s.t_s / 2.0), np.cos(omega * s.t_s / 2.0)
     size = np.hypot(i_d, i_q)
-    rest_q = u_q - v_1 * i_q / size - (m.resistance_ohm * cosine + jump * m.inductance_q_h) * i_q
-    rest_d = u_d - v_1 * i_d / size + w_l * m.inductance_q_h * i_q - jump * m.inductance_d_h * i_d
-    (psi, l_d), (s_psi, _), _ = solve(np.column_stack([w_e, w_l * i_d])[:-1], rest_q[:-1])
+    rest_q = u_q - v_1 * i_q / size - m.resistance_ohm * cosine * i_q
+    rest_d = u_d - v_1 * i_d / size + w_e * m.inductance_q_h * i_q
+    (psi, l_d), (s_psi, _), _ = solve(np.column_stack([w_e, w_e * i_d])[:-1], rest_q[:-1])
     s_psi *= math.sqrt(REPEATED)
-    most = COARSE_PSI if s.coarse else SIGMA_PSI
-    if not psi > 0.0 or s_psi > most * psi:
+    if not psi > 0.0 or s_psi > SIGMA_PSI * psi:
         raise Refusal(
-            f"psi = {1e3 * psi:.4g} +-{1e3 * s_psi:.2g} mWb: expected an uncertainty below {100 * most:.0f} %; "
+            f"psi = {1e3 * psi:.4g} +-{1e3 * s_psi:.2g} mWb: expected an uncertainty below {100 * SIGMA_PSI:.0f} %; "
             "a load that swings, or too low a speed"
         )
     (r, error), (_, s_error), _ = solve(np.column_stack([cosine * i_d, w_e * psi])[:-1], rest_d[:-1])
@@ -241,7 +226,7 @@ def judge(s: Session, first: Step, points: list[np.ndarray], v_1: float) -> Step
             f"the EMF shows that the encoder's offset is wrong by {math.degrees(error):.0f} degrees, expected "
             f"{LARGEST_ERROR_DEG:.0f} at most: the encoder slips, or alignment was disturbed"
         )
-    told_q = (w_e * psi + w_l * l_d * i_d + u_q - rest_q)[-1]
+    told_q = (w_e * psi + w_e * l_d * i_d + u_q - rest_q)[-1]
     told_d = (cosine * r * i_d + w_e * psi * error + u_d - rest_d)[-1]
     wrong = math.hypot(told_d - u_d[-1], told_q - u_q[-1]) / math.hypot(u_d[-1], u_q[-1])
     if wrong > PREDICTED:

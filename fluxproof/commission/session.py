@@ -107,14 +107,6 @@ class Session:
             return 1.0 / SECTORS
         return 1.0 / min(2**self.drive.sensors.position_bits, self.drive.encoder.counts or 1 << 30)
 
-    @property
-    def turning_part(self) -> float:
-        """What a vector that stands in the frame of the code has in the rotor's, in the mean of a turn.
-
-        The rotor moves by +-30 degrees against the middle of a Hall sector: sin(30 deg)/(pi/6) = 3/pi.
-        """
-        return 3.0 / math.pi if self.coarse else 1.0
-
     # ---------------------------------------------------------------- registers
 
     def load(self, kp: float | None = None, ki: float | None = None, **others: int) -> None:

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fluxproof.commission.bus import CODES, VALUES, checked
-from fluxproof.commission.simulated_edges import edges_of
 from fluxproof.commission.simulated_loop import FIELDS, INPUTS, LAST_ANGLE, REFERENCED, Around, Memory, advance
 from fluxproof.cosim.driven_plant import described_sensors
+from fluxproof.cosim.sensor_edges import edges_of
 from fluxproof.plant import (
     FREE,
     IMPOSED_SPEED,

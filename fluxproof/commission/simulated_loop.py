@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fluxproof.commission.simulated_edges import COUNTS, HALL, edge_speed, hall_code
 from fluxproof.cosim.golden_loop import mixed_kernel
+from fluxproof.cosim.sensor_edges import COUNTS, HALL, Edges, edge_speed, hall_code
 from fluxproof.plant import advance_switching, centred_gates
 from fluxproof.plant import layout as L
 from fluxproof.plant.sensors import current_code, position_code, u_dc_code
@@ -64,7 +64,7 @@ class Memory(NamedTuple):
     flags: np.ndarray  # (3,) enable, tripped, latched faults
     forced: np.ndarray  # (6,) SOURCE to LAST_ANGLE
     counting: np.ndarray  # (4,) REFERENCED to PASSES
-    edges: np.ndarray  # as simulated_edges
+    edges: Edges  # of its encoder
     codes: np.ndarray  # (6,) CODES of the last sample
     observed: np.ndarray  # (len(FIELDS),) its values
     held: np.ndarray  # (2,) 1: the encoder does not move any more; mechanical rad at which it stands
@@ -111,11 +111,11 @@ def encoder(around, memory, usual, k):
     theta_m, omega_m = (memory.held[1], 0.0) if lost else (plant[L.THETA_M], plant[L.OMEGA_M])
     code, omega = position_code(a.sensors, theta_m, k), usual.omega_given
     turns = (a.sensors.direction * theta_m + a.sensors.position_offset) / TURN_RAD
-    if edges[COUNTS] > 0.0:
-        turns_per_s = a.sensors.direction * omega_m / TURN_RAD
+    turns_per_s = a.sensors.direction * omega_m / TURN_RAD
+    if edges.speed[COUNTS] > 0.0:
         omega = (-1 if usual.reverse else 1) * edge_speed(edges, turns, turns_per_s, k * a.period_s)
-    if edges[HALL] > 0.0:
-        code = hall_code(a.params.machine.pole_pairs, turns, bits)
+    if edges.speed[HALL] > 0.0:
+        code = hall_code(edges, turns, turns_per_s, k * a.period_s, bits)
     code, found = counted(memory.counting, code, 1 << bits, a.has_index, a.passes)
     return code, found, omega
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from fluxproof.cosim.closed_loop import Result
 from fluxproof.cosim.driven_plant import Scenario, described_sensors, load_torque
+from fluxproof.cosim.sensor_edges import HALL, Edges, edge_speed, hall_code, no_edges
 from fluxproof.plant import (
     FREE,
     Bus,
@@ -28,6 +29,7 @@ from fluxproof.plant.jit import SOURCE_HASH
 from fluxproof.plant.sensors import current_code, position_code, u_dc_code
 from golden_model import fluxproof
 from golden_model.kernel import CACHE_DIR, kernel
+from golden_model.units import TURN_RAD
 
 BOTH = CACHE_DIR.parent / f"{CACHE_DIR.name}-{SOURCE_HASH}"
 
@@ -61,6 +63,7 @@ class Bench(NamedTuple):
     free: bool  # False: the speed is imposed
     bus: Bus
     u_dc: np.ndarray  # (1,) V, of the bus
+    edges: Edges  # of Hall sensors; of other encoders the position is a code
 
 
 @kernel
@@ -119,6 +122,19 @@ PLANT = ("i_d", "i_q", "lambda_d", "lambda_q", "omega_m", "torque", "u_dc", "pow
 
 
 @mixed_kernel
+def position(bench, number):
+    """(position code, omega_given) at the sample of this number."""
+    b, plant_state = bench, bench.plant_state
+    if b.edges.speed[HALL] == 0.0:
+        return position_code(b.sensors, plant_state[L.THETA_M], number), b.registers.omega_given
+    turns = (b.sensors.direction * plant_state[L.THETA_M] + b.sensors.position_offset) / TURN_RAD
+    turns_per_s, now = b.sensors.direction * plant_state[L.OMEGA_M] / TURN_RAD, number * b.period_s
+    sense = -1 if b.registers.reverse else 1
+    omega = sense * edge_speed(b.edges, turns, turns_per_s, now)
+    return hall_code(b.edges, turns, turns_per_s, now, b.config.position_bits), omega
+
+
+@mixed_kernel
 def run_switching(state, stimulus, bench, first, out, observed):
     """Closed loop over the switching plant; returns the controller's state.
 
@@ -135,12 +151,19 @@ def run_switching(state, stimulus, bench, first, out, observed):
         given = stimulus.samples[k]
         u_dc = b.u_dc[0] if b.bus.capacitance > 0.0 else stimulus.u_dc[k]
         out[k, 6] = u_dc
+        code, omega_given = position(b, first + k)
+        of_speed = fluxproof.Given(
+            speed_given=b.registers.speed_given,
+            omega_given=omega_given,
+            position_restart=b.registers.position_restart,
+            emf_samples=b.registers.emf_samples,
+        )
         sample = fluxproof.Sample(
             adc_a=current_code(sensors, 0, plant_state[L.I_A], first + k),
             adc_b=current_code(sensors, 1, plant_state[L.I_B], first + k),
             adc_c=current_code(sensors, 2, plant_state[L.I_C], first + k),
             adc_u_dc=u_dc_code(sensors, u_dc, first + k),
-            position_code=position_code(sensors, plant_state[L.THETA_M], first + k),
+            position_code=code,
             omega_ref=given[0],
             i_d_ref=given[1],
             i_q_ext=given[2],
@@ -153,7 +176,7 @@ def run_switching(state, stimulus, bench, first, out, observed):
         duties[0] = state.compare_a / b.config.carrier_half
         duties[1] = state.compare_b / b.config.carrier_half
         duties[2] = state.compare_c / b.config.carrier_half
-        state, seen = fluxproof.step(state, sample, b.registers, b.config)
+        state, seen = fluxproof.step_given(state, sample, b.registers, b.config, of_speed)
         for n, value in enumerate(seen):
             observed[k, n] = value
         if b.registers.double_update:
@@ -175,14 +198,15 @@ def run_switching(state, stimulus, bench, first, out, observed):
 
 def simulate(
     drive, register_set, scenario: Scenario, machine=None, sensors=None, dead_time_s=0.0, mode=FREE, state=None,
-    inverter=None, progress=None, bus=IDEAL,
+    inverter=None, progress=None, bus=IDEAL, edges=None,
 ) -> Result:  # fmt: skip
     """``scenario`` with the golden model and the switching plant, compiled; as cosim.cosimulate, but faster.
 
     The inverter follows the compare values in force with a dead time of ``dead_time_s``; zero is the ideal inverter
     that paper 001 assumes; ``inverter`` adds device drops.  ``state`` is the controller's initial state; the result has
     the last one.  ``mode`` IMPOSED_SPEED: the scenario's load is the mechanical speed [rad/s].
-    ``bus``: what is between the source, whose voltage is the scenario's u_dc, and the inverter.
+    ``bus``: what is between the source, whose voltage is the scenario's u_dc, and the inverter.  ``edges``: of Hall
+    sensors, whose angle is then that of the board; the registers must be those of such a code.
     ``progress``, if given, is called with the periods done and their number, every PROGRESS_PERIODS.
     """
     machine = machine or Machine.from_mapping(vars(drive.machine))
@@ -215,6 +239,7 @@ def simulate(
         free=mode == FREE,
         bus=bus,
         u_dc=np.array([float(scenario.u_dc[0])]),
+        edges=edges or no_edges(),
     )
     shown = set() if progress is None else set(range(0, n, PROGRESS_PERIODS))
     ends = [*sorted((set(scenario.changes) | shown) - {0}), n]

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fluxproof.cosim.golden_loop import simulate
+from fluxproof.cosim.sensor_edges import edges_of
 from fluxproof.plant import FREE, IMPOSED_SPEED, Bus, Inverter, Machine
 from fluxproof.simulate.scene import Scene
 from golden_model import supply
@@ -96,4 +97,5 @@ def _simulate(drive, register_set, scene, progress):
         inverter=inverter_of(drive),
         progress=progress,
         bus=bus_of(drive),
+        edges=edges_of(drive) if drive.encoder.kind == "hall" else None,
     )

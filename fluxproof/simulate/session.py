@@ -14,6 +14,7 @@ from fluxproof.simulate.regeneration import Regeneration, regeneration, told
 from fluxproof.simulate.ripple import ripple
 from fluxproof.simulate.run import Run, run
 from fluxproof.simulate.scene import current_step, fast_current_step, fastest, main_scene
+from golden_model.board_registers import core_changes
 from golden_model.drive import Drive
 from golden_model.registers import RegisterSet, registers
 
@@ -26,6 +27,8 @@ def simulate(
     ``say`` is told in a word or two what is being done; ``plant``: keys of [plant.*], which are not simulated.
     """
     register_set = registers(drive)
+    if drive.encoder.kind == "hall":  # its code is electrical, its speed that between edges
+        register_set = register_set._replace(values=register_set.values._replace(**core_changes(drive)))
     scene = main_scene(drive)
     say("compiling")
     step = run(drive, register_set, current_step(drive))

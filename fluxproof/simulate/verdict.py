@@ -124,7 +124,7 @@ def not_modelled(drive: Drive, runs: list[Run], plant: Sequence[str] = ()) -> li
     ]
     kind = drive.encoder.kind
     if kind == "hall":
-        lines.append("the 60 degree steps of the Hall sensors: the position is taken as interpolated by the board")
+        lines.append("uneven Hall sensors and the filter of their pins")
     elif kind != "code":
         lines.append(f"the {kind} interface itself: lost edges, bad frames, and the search for the index")
     if drive.converters.kind != "codes":

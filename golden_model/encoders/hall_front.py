@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Three Hall sensors from their pins to a code and a speed: three filters, hall_decoder and edge_timer, wired.
+"""Three Hall sensors from their pins to a code and a speed: filters, hall_decoder, hall_angle and edge_timer, wired.
 
-Nothing is computed here.  ``sample_trigger`` latches the upper bits of theta_hall as the code of a sensor alone, with
-``pole_pairs`` 1; the speed is that between two sectors, with ``k_edge`` for 6 counts a turn.
+Nothing is computed here.  The upper bits of hall_angle's angle are the code of a sensor alone, with ``pole_pairs`` 1;
+the speed is that between two sectors, with ``k_edge`` for 6 counts a turn, and comes after the code.
 """
 
 from collections import namedtuple
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from golden_model.block import Block, Port
 from golden_model.common import input_filter
-from golden_model.encoders import edge_timer, hall_decoder
+from golden_model.encoders import edge_timer, hall_angle, hall_decoder
 from golden_model.encoders.edge_timer import MOVED_W, TIME_W
 from golden_model.encoders.quadrature_decoder import EVENTS
 from golden_model.fixed import Format
@@ -19,6 +19,7 @@ from golden_model.io.position import code_format
 from golden_model.kernel import kernel
 
 filter_step, hall_step, timer_step = input_filter.step, hall_decoder.step, edge_timer.step
+angle_step = hall_angle.step
 
 
 class State(NamedTuple):
@@ -26,12 +27,13 @@ class State(NamedTuple):
     of_filter_b: input_filter.State = input_filter.State()
     of_filter_c: input_filter.State = input_filter.State()
     of_decoder: hall_decoder.State = hall_decoder.State()
+    of_angle: hall_angle.State = hall_angle.State()
     of_timer: edge_timer.State = edge_timer.State()
-    code: int = 0
     # Outputs that the next clock reads
     theta_hall: int = 0
     step_up: int = 0
     step_down: int = 0
+    skipped: int = 0
 
 
 @kernel
@@ -49,11 +51,14 @@ def step(state, inputs, regs, position_bits):
         s.of_decoder, s.of_filter_a.level, s.of_filter_b.level, s.of_filter_c.level, settled, x.clear_encoder,
         r.hall_reverse, r.hall_offset, r.start_first, r.sector_counts,
     )  # fmt: skip
+    angle, (theta,) = angle_step(
+        s.of_angle, s.step_up, s.step_down, s.skipped, s.theta_hall, x.sample_trigger, hall_angle.TIME_W
+    )
     timer, (omega_me, omega_valid) = timer_step(
         s.of_timer, s.step_up, s.step_down, x.sample_trigger, r.reverse, r.k_edge, TIME_W, MOVED_W
     )
-    code = s.theta_hall >> (TURN_W - position_bits) if x.sample_trigger else s.code
-    following = State(filter_a, filter_b, filter_c, decoder, timer, code, theta_hall, step_up, step_down)
+    code = theta >> (TURN_W - position_bits)
+    following = State(filter_a, filter_b, filter_c, decoder, angle, timer, theta_hall, step_up, step_down, skipped)
     return following, (
         code, omega_me, omega_valid, hall_valid, start_count, start_valid, illegal_count, skipped_count, skipped,
     )  # fmt: skip
@@ -124,7 +129,7 @@ BLOCK = Block(
     takes=(Inputs, Registers),
     inputs=INPUTS,
     registers=ALL_REGISTERS,
-    outputs=(Port("code_theta", Format(0, 0, 16), doc="angle of the sector, latched by the trigger"),)
+    outputs=(Port("code_theta", Format(0, 0, 16), doc="angle at the trigger, a few clocks later"),)
     + tuple(_PORTS[n] for n in ("omega_me", "omega_valid", "hall_valid", "start_count", "start_valid"))
     + tuple(_PORTS[n] for n in ("illegal_count", "skipped_count", "skipped")),
     state=State(),

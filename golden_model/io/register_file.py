@@ -71,10 +71,10 @@ class RegisterFile:
         return OKAY
 
     def read(self, address: int) -> tuple[int, int]:
-        """A read on the bus: (response, word); the word of a refused read is zero."""
+        """A read on the bus: (response, word); OKAY and zero where there is no register."""
         register = self._at(address)
         if register is None:
-            return DECERR, 0
+            return OKAY, 0
         return OKAY, self._word(register)
 
     def clock(self) -> None:

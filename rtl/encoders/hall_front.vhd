@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: BSD-3-Clause
--- Purpose: three Hall sensors from their pins to a code and a speed: three filters, hall_decoder and edge_timer.
--- Nothing is computed here.  sample_trigger latches the upper bits of theta_hall as the code of a sensor alone, with
--- pole_pairs 1; the speed is that between two sectors, with k_edge for 6 counts a turn.
+-- Purpose: three Hall sensors from their pins to a code and a speed: filters, hall_decoder, hall_angle and edge_timer.
+-- Nothing is computed here.  The upper bits of hall_angle's angle are the code of a sensor alone, with pole_pairs 1; the
+-- speed is that between two sectors, with k_edge for 6 counts a turn, and comes after the code.
 -- Formats: those of the blocks.  Latency: 1 (every clock is a sample), sample_trigger to omega_valid that of edge_timer.
 -- Rounding: the code is cut.
 
@@ -44,7 +44,8 @@ end entity hall_front;
 architecture rtl of hall_front is
   signal pins, levels, steady : std_logic_vector(0 to 2);
   signal settled              : std_logic;
-  signal theta_hall           : unsigned(TURN_W - 1 downto 0);
+  signal theta_hall, theta    : unsigned(TURN_W - 1 downto 0);
+  signal skip                 : std_logic;
   signal step_up, step_down   : std_logic;
 begin
   pins    <= hall_a & hall_b & hall_c;
@@ -65,24 +66,19 @@ begin
               sector_counts => sector_counts,
               theta_hall => theta_hall, sector => open, hall_valid => hall_valid, step_up => step_up,
               step_down => step_down, start_count => start_count, start_valid => start_valid,
-              illegal_count => illegal_count, skipped_count => skipped_count, skipped => skipped);
+              illegal_count => illegal_count, skipped_count => skipped_count, skipped => skip);
+
+  skipped <= skip;
+
+  angle : entity work.hall_angle
+    port map (clk => clk, rst => rst, step_up => step_up, step_down => step_down, skipped => skip,
+              theta_hall => theta_hall, sample => sample_trigger, theta => theta);
+
+  code_theta <= theta(TURN_W - 1 downto TURN_W - POSITION_BITS);
 
   timer : entity work.edge_timer
     port map (clk => clk, rst => rst, step_up => step_up, step_down => step_down, sample => sample_trigger,
               reverse => reverse, k_edge => k_edge,
               omega_me => omega_me, omega_valid => omega_valid);
-
-  process (clk)
-  begin
-    if rising_edge(clk) then
-      if sample_trigger = '1' then
-        code_theta <= theta_hall(TURN_W - 1 downto TURN_W - POSITION_BITS);
-      end if;
-
-      if rst = '1' then
-        code_theta <= (others => '0');
-      end if;
-    end if;
-  end process;
 
 end architecture rtl;

@@ -8,7 +8,7 @@
 --
 -- sample_busy must be high from the clock after a sample was accepted until it has left the pipeline: no output that a
 -- sample uses changes at an edge with sample_busy = '1'.
--- Refused writes change nothing, refused reads give zero; for the rules and the responses see register_access.vhd.
+-- Refused writes change nothing, a read without a register gives zero; rules and responses: register_access.vhd.
 -- Formats: those of the core's ports.  Latency: 6 clocks from request to response, more while a write waits for the
 -- end of a sample.  Rounding: none.
 

@@ -446,6 +446,13 @@ package fluxproof_pkg is
   constant FORCED_POSITION_PLACE_W : natural := 32;
   constant FORCED_POSITION_SHIFT : natural := 14;
 
+  -- hall_angle: none: three Hall sensors, 120 degrees apart
+  constant HALL_ANGLE_LATENCY : positive := 1;
+  constant HALL_ANGLE_TIME_W : natural := 21;
+  constant HALL_ANGLE_QUOTIENT_W : natural := 16;
+  constant HALL_ANGLE_GUARD : natural := 6;
+  constant HALL_ANGLE_HALF_SECTOR : natural := 1398101;
+
   -- hall_decoder: none: three Hall sensors, 120 degrees apart
   constant HALL_DECODER_LATENCY : positive := 1;
   type hall_decoder_middle_t is array (0 to 7) of unsigned(17 downto 0);

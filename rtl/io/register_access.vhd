@@ -7,7 +7,8 @@
 -- A write that must wait for the end of a sample waits at most REGISTER_PATIENCE clocks: if samples follow each other
 -- without a gap, it ends in SLVERR instead of blocking the bus.  A read, a refusal and a write that takes effect at
 -- once never wait for a sample; but AXI4-Lite answers in order, so they wait behind a waiting write.
--- Answers: OKAY; DECERR if no register has the address; SLVERR for a write that is not allowed or timed out.
+-- Answers: OKAY; to a write DECERR if no register has the address, SLVERR if it is not allowed or timed out.  A read of
+-- such an address is answered by OKAY and zero, so that a dump of the window ends no process by a bus error.
 -- One comparator serves every register: its limits come from tables in register_map_pkg.
 -- Formats: data as signed 32 bits; no register reaches 2**31.  Latency: 5 clocks without waiting; store is valid in the
 -- clock before the edge at which the register changes.  arming comes a clock earlier: a register's enable needs only
@@ -169,8 +170,9 @@ begin
   arming   <= allowed_4 or (patient_5 and may_stay and in_time);
   store    <= granted_5;
   answer   <= judged_5 and not waits_5;
-  response <= DECERR when found = '0' else
-              SLVERR when write = '1' and granted_5 = '0' else
+  response <= OKAY when write = '0' else
+              DECERR when found = '0' else
+              SLVERR when granted_5 = '0' else
               OKAY;
 
 end architecture rtl;
