@@ -80,9 +80,12 @@ def speed_loop(drive):
     keys = "[machine] inertia_kgm2, magnet_flux_wb, pole_pairs; [control] speed_bandwidth_hz"
     kp_keys = keys if c.speed_kp_as_per_rad is None else "[control] speed_kp_as_per_rad"
     ki_keys = keys if c.speed_ki_a_per_rad is None else "[control] speed_ki_a_per_rad"
-    per_speed = b.current_a / b.omega_me_rad_s
-    yield Entry("speed_kp", kp, "A s/rad", per_speed, f"{kp_keys}; {base}")
-    yield Entry("speed_ki", ki, "A/rad", per_speed / t_s, f"{ki_keys}; {base}")
+    per_speed, what = b.current_a / b.omega_me_rad_s, "A"
+    if drive.core.references:  # the regulator's output is a torque then
+        per_ampere = 1.5 * m.pole_pairs * m.magnet_flux_wb
+        kp, ki, per_speed, what = kp * per_ampere, ki * per_ampere, drive.torque_base_nm / b.omega_me_rad_s, "Nm"
+    yield Entry("speed_kp", kp, f"{what} s/rad", per_speed, f"{kp_keys}; {base}")
+    yield Entry("speed_ki", ki, f"{what}/rad", per_speed / t_s, f"{ki_keys}; {base}")
     limit = "[machine] rated_current_a" if c.current_limit_a is None else "[control] current_limit_a"
     yield Entry("i_max", drive.current_limit_a, "A", b.current_a, f"{limit}; {base_keys(drive, 'current_a')}")
 

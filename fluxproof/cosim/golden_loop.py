@@ -61,6 +61,7 @@ class Bench(NamedTuple):
     free: bool  # False: the speed is imposed
     bus: Bus
     u_dc: np.ndarray  # (1,) V, of the bus
+    table: np.ndarray  # words of the torque table, as RegisterSet
 
 
 @kernel
@@ -153,7 +154,8 @@ def run_switching(state, stimulus, bench, first, out, observed):
         duties[0] = state.compare_a / b.config.carrier_half
         duties[1] = state.compare_b / b.config.carrier_half
         duties[2] = state.compare_c / b.config.carrier_half
-        state, seen = fluxproof.step(state, sample, b.registers, b.config)
+        of_speed = fluxproof.given_by_registers(b.registers)
+        state, seen = fluxproof.step_table(state, sample, b.registers, b.config, of_speed, b.table)
         for n, value in enumerate(seen):
             observed[k, n] = value
         if b.registers.double_update:
@@ -215,6 +217,7 @@ def simulate(
         free=mode == FREE,
         bus=bus,
         u_dc=np.array([float(scenario.u_dc[0])]),
+        table=register_set.table,
     )
     shown = set() if progress is None else set(range(0, n, PROGRESS_PERIODS))
     ends = [*sorted((set(scenario.changes) | shown) - {0}), n]
