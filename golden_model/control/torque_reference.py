@@ -143,26 +143,48 @@ def step(state, inputs, regs, example):
     return step_table(state, inputs, regs, EXAMPLE if example else BLANK)
 
 
-def reference(v, state):
-    """The flux limit's effect on the limit of the torque, in real numbers: the table itself is integers."""
-    table, share = EXAMPLE * PU.lsb, (state.share >> DROP_SHARE) * 2.0**-RATIO_BITS
-    gain = (state.torque_gain >> (TORQUE_GAIN.frac_bits - PU.frac_bits)) * PU.lsb
+def _point(v, state):
+    """(row, top, column) of a sample in real numbers, within the example."""
+    share = (state.share >> DROP_SHARE) * 2.0**-RATIO_BITS
     speed, reach = abs(v["omega_me"]), share * v["u_max"] * v["k_flux"]
-    flux = RATIO_MAX / (1 << RATIO_BITS) if reach >= speed else reach / speed
-    at = min(flux * (ROWS - 1), ROWS - 1 - 1e-9)
-    row = int(at)
-    low, high = (table[0, (row + k) * WORDS + COLUMNS] for k in (0, 1))
-    top = max(0.0, low + (at - row) * (high - low))
-    return {"torque_max": min((2.0 - gain) * top, PU.hi * PU.lsb)}
+    row = (ROWS - 1) * (1.0 if reach >= speed else reach / speed)
+    top = max(0.0, v["EXAMPLE"] * _across(0, row, COLUMNS))
+    asked = abs(v["torque_ref"]) * (state.torque_gain >> DROP_GAIN) * PU.lsb
+    return row, top, (COLUMNS - 1) * (1.0 if asked >= top else asked / top)
+
+
+def _across(axis, row, column):
+    """The example at a row between its rows, in one column."""
+    k = min(int(row), ROWS - 2)
+    low, high = (float(EXAMPLE[axis, (k + n) * WORDS + column]) * PU.lsb for n in (0, 1))
+    return low + (row - k) * (high - low)
+
+
+def reference(v, state):
+    row, top, column = _point(v, state)
+    k = min(int(column), COLUMNS - 2)
+    i_d, i_q = (
+        v["EXAMPLE"] * ((k + 1 - column) * _across(axis, row, k) + (column - k) * _across(axis, row, k + 1))
+        for axis in (0, 1)
+    )
+    gain = (state.torque_gain >> DROP_GAIN) * PU.lsb
+    i_q = math.copysign(max(0.0, i_q), v["torque_ref"]) if v["torque_ref"] else max(0.0, i_q)
+    return {"i_d_table": i_d, "i_q_table": i_q, "torque_max": min((2.0 - gain) * top, PU.hi * PU.lsb)}
 
 
 def bound(v, state):
-    """The floors of reach and dividend over the speed, the row's fraction, and the steepest row of the example."""
+    """Floors of reach, dividends and both fractions, times the steepest step of the example between rows and columns."""
+    fraction = 2.0**-COLUMN_BITS
     speed = max(abs(v["omega_me"]), PU.lsb)
-    flux = (2.0**-REACH_BITS * v["k_flux"] + 2 * PU.lsb) / speed + 2.0**-RATIO_BITS
-    rows = min(flux * (ROWS - 1) + 2.0**-COLUMN_BITS, ROWS)
-    steps = np.abs(np.diff(EXAMPLE[0, COLUMNS::WORDS])) * PU.lsb
-    return {"torque_max": 1.5 * rows * float(steps.max()) + 4 * PU.lsb}
+    flux = (2.0**-REACH_BITS * v["k_flux"] + 2.0 * PU.lsb) / speed + 2.0**-RATIO_BITS
+    rows = min((ROWS - 1) * flux + fraction, float(ROWS))
+    example = EXAMPLE.reshape(2, ROWS, WORDS) * PU.lsb
+    down, along = (float(np.abs(np.diff(example, axis=axis)).max()) for axis in (1, 2))
+    top = rows * float(np.abs(np.diff(example[0, :, COLUMNS])).max()) + 2.0 * PU.lsb
+    real = max(_point(v, state)[1] - top, PU.lsb)
+    columns = min((COLUMNS - 1) * ((PU.lsb + top) / real + 2.0**-RATIO_BITS) + fraction, float(COLUMNS))
+    current = rows * down + columns * along + 4.0 * PU.lsb
+    return {"i_d_table": current, "i_q_table": current, "torque_max": 1.5 * top + 2.0 * PU.lsb}
 
 
 def possible(row, _config):

@@ -54,6 +54,8 @@ architecture rtl of torque_reference is
   constant STEP_W  : positive := KI_W + 1 + PU_W - DROP;
 
   constant ONE  : unsigned(GAIN_W - 1 downto 0)  := (GAIN_W - 1 => '1', others => '0');
+  constant GAIN_MIN : unsigned(GAIN_W - 1 downto 0) := shift_right(ONE, 1);
+  constant GAIN_MAX : unsigned(GAIN_W - 1 downto 0) := ONE + GAIN_MIN;
   constant FULL : unsigned(SHARE_W - 1 downto 0) := (others => '1');
 
   subtype word_t is signed(PU_W - 1 downto 0);
@@ -108,8 +110,8 @@ architecture rtl of torque_reference is
   signal whole          : std_logic;  -- the quotient is 1 or more
   signal quotient       : unsigned(15 downto 0);
   signal dividing       : std_logic;
-  signal rest_1, rest_2 : size_t;
-  signal bit_1, bit_2   : std_logic;
+  signal divided_1      : unsigned(PU_W downto 0);  -- bit of the quotient, rest
+  signal divided_2      : unsigned(PU_W downto 0);
   signal ratio          : unsigned(15 downto 0);
   signal row_at         : unsigned(21 downto 0);
   signal column_at      : unsigned(20 downto 0);
@@ -122,32 +124,29 @@ architecture rtl of torque_reference is
   signal left, pull     : word_t;
   signal share_moved    : signed(STEP_W downto 0);
   signal gain_moved     : signed(STEP_W downto 0);
+  signal least          : unsigned(SHARE_W - 1 downto 0);
   signal next_d, next_q : word_t;
 
-  -- One step of the division: (bit of the quotient, new rest) of rest/divisor.
-  function divided (rest, divisor : size_t) return unsigned is
-    constant DIFF : unsigned(PU_W downto 0) := (rest & '0') - ('0' & divisor);
+  -- One step of the division: bit of the quotient, and the new rest below it.
+  function divided (remainder : size_t; by : size_t) return unsigned is
+    constant LESS : unsigned(PU_W downto 0) := (remainder & '0') - ('0' & by);
   begin
-    return ('1' & DIFF(PU_W - 1 downto 0)) when (rest & '0') >= ('0' & divisor) else (rest & '0');
+    if (remainder & '0') < ('0' & by) then
+      return '0' & remainder(PU_W - 2 downto 0) & '0';
+    end if;
+    return '1' & LESS(PU_W - 1 downto 0);
   end function;
 begin
   valid(0) <= in_valid;
   gain     <= signed('0' & state.torque_gain(GAIN_W - 1 downto GAIN_W - PU_W + 1));
 
-  process (all)
-    variable after : unsigned(PU_W downto 0);
-  begin
-    after  := divided(rest, divisor);
-    bit_1  <= '1' when (rest & '0') >= ('0' & divisor) else '0';
-    rest_1 <= after(PU_W - 1 downto 0);
-    after  := divided(after(PU_W - 1 downto 0), divisor);
-    bit_2  <= '1' when (rest_1 & '0') >= ('0' & divisor) else '0';
-    rest_2 <= after(PU_W - 1 downto 0);
-  end process;
+  divided_1 <= divided(rest, divisor);
+  divided_2 <= divided(divided_1(PU_W - 1 downto 0), divisor);
 
   ratio     <= (others => '1') when whole = '1' else quotient;
   row_at    <= shift_left(resize(ratio, 22), 6) - ratio;  -- ratio*(ROWS - 1)
   column_at <= shift_left(resize(ratio, 21), 5) - shift_left(resize(ratio, 21), 1);  -- ratio*(COLUMNS - 1)
+  least     <= shift_left(resize(share_min, SHARE_W), SHARE_W - 16);
   reading   <= or valid(14 to 33);
 
   -- The table: two block RAMs, written by software, read word by word
@@ -184,7 +183,7 @@ begin
         y_a   <= signed(resize(u_max, PU_W));
         x_b   <= abs(resize(torque_ref, x_b'length));
         y_b   <= gain;
-        speed <= unsigned(resize(abs(resize(omega_me, PU_W + 1)), PU_W));
+        speed <= resize(magnitude(omega_me), PU_W);
       end if;
 
       -- Stage 3: share*u_max*k_flux
@@ -205,8 +204,8 @@ begin
         dividing <= '1';
       end if;
       if dividing = '1' then
-        rest     <= rest_2;
-        quotient <= quotient(13 downto 0) & bit_1 & bit_2;
+        rest     <= divided_2(PU_W - 1 downto 0);
+        quotient <= quotient(13 downto 0) & divided_1(PU_W) & divided_2(PU_W);
       end if;
       if valid(12) = '1' or valid(27) = '1' then
         dividing <= '0';
@@ -299,8 +298,8 @@ begin
       end if;
       if valid(31) = '1' then
         state.share <= unsigned(share_moved(SHARE_W - 1 downto 0));
-        if share_moved < signed('0' & share_min & "000000000000") then
-          state.share <= share_min & "000000000000";
+        if share_moved < signed('0' & least) then
+          state.share <= least;
         elsif share_moved > signed('0' & FULL) then
           state.share <= FULL;
         end if;
@@ -308,10 +307,10 @@ begin
           state.share <= FULL;
         elsif whole = '0' and fast = '1' then
           state.torque_gain <= unsigned(gain_moved(GAIN_W - 1 downto 0));
-          if gain_moved < signed('0' & shift_right(ONE, 1)) then
-            state.torque_gain <= shift_right(ONE, 1);
-          elsif gain_moved > signed('0' & (ONE + shift_right(ONE, 1))) then
-            state.torque_gain <= ONE + shift_right(ONE, 1);
+          if gain_moved < signed('0' & GAIN_MIN) then
+            state.torque_gain <= GAIN_MIN;
+          elsif gain_moved > signed('0' & GAIN_MAX) then
+            state.torque_gain <= GAIN_MAX;
           end if;
         end if;
       end if;

@@ -25,6 +25,7 @@ entity board_register_file is
     CARRIER_HALF  : natural := 10000;
     CLOCK_HZ      : natural := 200000000;
     ESTIMATORS    : natural := 1;
+    REFERENCES    : natural := 0;
     ENCODER       : natural := 1;
     CURRENTS      : natural := 1;
     SPI_LINES     : natural := 4

@@ -24,7 +24,8 @@ entity register_file is
     POSITION_BITS : natural := 16;
     CARRIER_HALF  : natural := 10000;
     CLOCK_HZ      : natural := 200000000;
-    ESTIMATORS    : natural := 1
+    ESTIMATORS    : natural := 1;
+    REFERENCES    : natural := 0
   );
   port (
     clk               : in  std_logic;
