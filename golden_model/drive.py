@@ -110,6 +110,7 @@ class Control:
     v_dead_gamma: float = not_negative("1", "proportional part of the compensation", 0.1)
     v_dead_zeta: float = not_negative("1", "gain of the minimisation per sample", 1e-4)
     v_dead_threshold_v: float | None = not_negative("V", "leg voltage below which the minimisation stops", None)
+    v_dead_start_v: float | None = not_negative("V", "leg voltage compensated from the start; see scaling.py", None)
     v_dead_limit_v: float | None = positive("V", "largest leg voltage that is compensated", None)
     psi_eta: float | None = positive("s2/rad2", "step of the psi_m Adaline, paper 000 eq. (13)", None)
     psi_min_speed_rad_s: float | None = positive("rad/s", "mechanical; psi_m is held below", None)

@@ -206,8 +206,6 @@ class State(NamedTuple):
     of_speed: speed.State = speed.State()
     of_current_limit: current_limit.State = current_limit.State()
     of_speed_pi: speed_pi.State = speed_pi.State()
-    of_current_reference: current_reference.State = current_reference.State()
-    of_torque_reference: torque_reference.State = torque_reference.State()
     of_current_pi: current_pi.State = current_pi.State()
     of_voltage_limit: voltage_limit.State = voltage_limit.State()
     of_flux_merge: flux_merge.State = flux_merge.State()
@@ -240,9 +238,12 @@ class State(NamedTuple):
     v_leg: int = 0
     s_alpha: int = 0
     s_beta: int = 0
+    # The torque table's part; last, so that a state written by an older core is the beginning of one.
     i_d_table: int = 0
     i_q_table: int = 0
     torque_max: int = 0
+    of_current_reference: current_reference.State = current_reference.State()
+    of_torque_reference: torque_reference.State = torque_reference.State()
 
 
 class Observed(NamedTuple):

@@ -420,7 +420,7 @@ begin
                 current_at_rail => o.current_at_rail, voltage_known => voltage_known, run => run,
                 k_lp => settings.k_lp, eta_v => settings.eta_v, gamma => settings.gamma, zeta => settings.zeta,
                 v_thr => settings.v_thr, v_comp_max => settings.v_comp_max, i_learn => settings.i_learn,
-                compensate => settings.compensate,
+                compensate => settings.compensate, v_start => settings.v_start,
                 out_valid => open, v_dead => e.v_dead, v_comp => e.v_comp, v_leg => v_leg,
                 v_comp_limited => e.v_comp_limited);
 

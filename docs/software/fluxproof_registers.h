@@ -839,6 +839,12 @@ extern "C" {
 #define FLUXPROOF__TABLE_WORD__VALUE_bw 31
 #define FLUXPROOF__TABLE_WORD__VALUE_reset 0x0
 
+// reg - fluxproof::v_start
+#define FLUXPROOF__V_START__VALUE_bm 0x1ffff
+#define FLUXPROOF__V_START__VALUE_bp 0
+#define FLUXPROOF__V_START__VALUE_bw 17
+#define FLUXPROOF__V_START__VALUE_reset 0x0
+
 // reg - fluxproof::encoder
 #define FLUXPROOF__ENCODER__VALUE_bm 0xffffffff
 #define FLUXPROOF__ENCODER__VALUE_bp 0
@@ -1460,7 +1466,8 @@ typedef struct {
     uint32_t k_torque;
     uint32_t omega_learn;
     uint32_t table_word;
-    uint8_t RESERVED_270_3ff[0x190];
+    uint32_t v_start;
+    uint8_t RESERVED_274_3ff[0x18c];
     uint32_t encoder;
     uint32_t currents;
     uint32_t spi_lines;

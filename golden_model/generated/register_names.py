@@ -142,6 +142,7 @@ ADDRESSES = {
     "k_torque": 0x264,
     "omega_learn": 0x268,
     "table_word": 0x26C,
+    "v_start": 0x270,
     "encoder": 0x400,
     "currents": 0x404,
     "spi_lines": 0x408,

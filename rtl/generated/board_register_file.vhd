@@ -694,6 +694,10 @@ begin
         settings.table_word <= unsigned(held(30 downto 0));
         written(155)        <= '1';
       end if;
+      if (row(19) and column(4) and not sample_busy) = '1' then
+        settings.v_start <= unsigned(held(16 downto 0));
+        written(156)     <= '1';
+      end if;
       if (row(32) and column(4)) = '1' then
         clear_encoder <= held(0);
       end if;
@@ -1037,6 +1041,7 @@ begin
         settings.k_torque         <= (others => '0');
         settings.omega_learn      <= (others => '0');
         settings.table_word       <= (others => '0');
+        settings.v_start          <= (others => '0');
         clear_encoder             <= '0';
         take_snapshot             <= '0';
         position_source           <= '0';

@@ -130,6 +130,7 @@ package fluxproof_pkg is
     v_comp_max       : unsigned(SAMPLE_TIME_W - 1 downto 0);  -- largest leg voltage that is compensated
     i_learn          : unsigned(DUTY_W - 1 downto 0);  -- the V_dead Adaline is held below this |i_d| + |i_q|
     compensate       : std_logic;  -- 1: compensate dead time and drops
+    v_start          : unsigned(SAMPLE_TIME_W - 1 downto 0);  -- leg voltage that is compensated until the Adaline has learnt it
     eta_psi          : unsigned(16 downto 0);  -- step of the psi_m Adaline, 2*eta per unit
     omega_psi_min    : unsigned(DUTY_W - 1 downto 0);  -- psi_m is held below this speed
     k_ahead          : unsigned(DUTY_W - 1 downto 0);  -- angle of 2.5 sample times in radians, per unit of speed

@@ -609,6 +609,10 @@ begin
         settings.table_word <= unsigned(held(30 downto 0));
         written(155)        <= '1';
       end if;
+      if (row(19) and column(4) and not sample_busy) = '1' then
+        settings.v_start <= unsigned(held(16 downto 0));
+        written(156)     <= '1';
+      end if;
 
       if rst = '1' then
         written                   <= (others => '0');
@@ -714,6 +718,7 @@ begin
         settings.k_torque         <= (others => '0');
         settings.omega_learn      <= (others => '0');
         settings.table_word       <= (others => '0');
+        settings.v_start          <= (others => '0');
       end if;
     end if;
   end process;

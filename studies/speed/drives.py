@@ -29,6 +29,7 @@ def weakened(path, speeds=SPEEDS, **control):
             drive.base_choice, omega_me_rad_s=m.pole_pairs * m.rated_speed_rad_s * speeds / 2.0
         ),
         control=dataclasses.replace(drive.control, **control),
+        protection=dataclasses.replace(drive.protection, overspeed_rad_s=0.98 * speeds * m.rated_speed_rad_s),
     )
 
 
