@@ -4,6 +4,7 @@
 --   torque_max = (2 - torque_gain)*top
 --   share       += k_voltage*((u_share*u_max)**2 - u_d**2 - u_q**2)    within share_min..1;  1 with run = 0
 --   torque_gain += k_torque*(torque_ref - torque)*torque_ref           within 1/2..3/2, where |omega_me| >= omega_learn
+--                                                                      and |u|**2 <= 3/4*(u_share*u_max)**2
 -- Two multipliers and one divider, two bits of the quotient a clock, are used one after the other.  Each of two block
 -- RAMs holds a current of the table; table_word writes one word at every clock in which its bit 30 is set.
 -- EXAMPLE = 1 fills the table at power-up, for the bench.
@@ -122,6 +123,7 @@ architecture rtl of torque_reference is
   signal most           : word_t;
   signal sum            : signed(36 downto 0);
   signal left, pull     : word_t;
+  signal spare          : word_t;  -- a quarter of (u_share*u_max)**2
   signal share_moved    : signed(STEP_W downto 0);
   signal gain_moved     : signed(STEP_W downto 0);
   signal least          : unsigned(SHARE_W - 1 downto 0);
@@ -265,9 +267,10 @@ begin
         y_b <= u_d;
       end if;
       if valid(24) = '1' then
-        sum <= resize(p_b, sum'length);
-        x_b <= resize(u_q, x_b'length);
-        y_b <= u_q;
+        sum   <= resize(p_b, sum'length);
+        spare <= resize(shift_right(p_b, TORQUE_REFERENCE_DROP_E + 2), PU_W);
+        x_b   <= resize(u_q, x_b'length);
+        y_b   <= u_q;
       end if;
       if valid(25) = '1' then
         sum <= resize(sum - p_b, sum'length);
@@ -305,7 +308,7 @@ begin
         end if;
         if run = '0' then
           state.share <= FULL;
-        elsif whole = '0' and fast = '1' then
+        elsif whole = '0' and fast = '1' and left >= spare then
           state.torque_gain <= unsigned(gain_moved(GAIN_W - 1 downto 0));
           if gain_moved < signed('0' & GAIN_MIN) then
             state.torque_gain <= GAIN_MIN;
