@@ -22,6 +22,8 @@ def weakened(path, speeds=SPEEDS, **control):
     """The drive of a file with the torque table, its speed base wide enough for ``speeds`` times the rated speed."""
     drive = drives.load(path)
     m = drive.machine
+    flux_base = drive.bases.voltage_v / (m.pole_pairs * m.rated_speed_rad_s * speeds / 2.0)
+    control.setdefault("flux_compensation_limit_wb", min(0.5 * drive.nominal_flux_wb, 0.95 * flux_base))
     return dataclasses.replace(
         drive,
         core=dataclasses.replace(drive.core, references=True),
