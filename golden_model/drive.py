@@ -87,6 +87,7 @@ class Control:
     current_limit_a: float | None = positive("A", "limit of the current, rated current if none", None)
     voltage_target: float = positive("1", "part of the voltage circle used above base speed", 0.98, most=1.0)
     weakening_bandwidth_hz: float = positive("Hz", "voltage loop above base speed", 20.0)
+    torque_rise_s: float = positive("s", "shortest time from zero to the largest torque, with the torque table", 2e-3)
     torque_bandwidth_hz: float = not_negative("Hz", "correction of the torque by the estimated flux", 2.0)
     voltage_reserve: float = not_negative("1", "part of the voltage circle left unused", 0.0, most=0.99)
     current_kp_d_v_per_a: float | None = not_negative("V/A", "override", None)

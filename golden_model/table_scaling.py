@@ -47,4 +47,6 @@ def references(drive, table):
     learn = max(FADED_IN * omega_0, 2.0 * omega_min) if on else 0.0
     keys = "[control] flux_crossover_hz, flux_min_speed_rad_s; [machine] rated_speed_rad_s"
     yield Entry("omega_learn", learn, "rad/s", b.omega_me_rad_s, f"{keys}; {base_keys(drive, 'omega_me_rad_s')}")
+    step = table.top_nm[-1] * min(t_s / c.torque_rise_s, 1.0) if on else 0.0
+    yield Entry("torque_step", step, "Nm", drive.torque_base_nm, "[control] torque_rise_s, current_limit_a; [machine]")
     yield Entry("table_word", 0, "1", 1.0, "none: loads the torque table")

@@ -210,7 +210,7 @@ begin
                 u_q => o.u_q, torque => e.torque,
                 k_flux => settings.k_flux, u_share => settings.u_share, k_voltage => settings.k_voltage,
                 share_min => settings.share_min, k_torque => settings.k_torque, omega_learn => settings.omega_learn,
-                table_word => settings.table_word,
+                torque_step => settings.torque_step, table_word => settings.table_word,
                 out_valid => open, i_d_table => i_d_table, i_q_table => i_q_table, torque_max => torque_max);
 
     table_current : entity work.current_reference

@@ -845,6 +845,12 @@ extern "C" {
 #define FLUXPROOF__V_START__VALUE_bw 17
 #define FLUXPROOF__V_START__VALUE_reset 0x0
 
+// reg - fluxproof::torque_step
+#define FLUXPROOF__TORQUE_STEP__VALUE_bm 0xffffffff
+#define FLUXPROOF__TORQUE_STEP__VALUE_bp 0
+#define FLUXPROOF__TORQUE_STEP__VALUE_bw 32
+#define FLUXPROOF__TORQUE_STEP__VALUE_reset 0x0
+
 // reg - fluxproof::encoder
 #define FLUXPROOF__ENCODER__VALUE_bm 0xffffffff
 #define FLUXPROOF__ENCODER__VALUE_bp 0
@@ -1467,7 +1473,8 @@ typedef struct {
     uint32_t omega_learn;
     uint32_t table_word;
     uint32_t v_start;
-    uint8_t RESERVED_274_3ff[0x18c];
+    uint32_t torque_step;
+    uint8_t RESERVED_278_3ff[0x188];
     uint32_t encoder;
     uint32_t currents;
     uint32_t spi_lines;

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """From torque to current references at the least current, above base speed too, by a table of the motor.
 
+    torque_now moves to torque_ref by torque_step in a sample at most; zero with ``run`` = 0
     r      = share*u_max*k_flux/|omega_me|                      flux limit, 1 is the flux of the table's last row
     top    = TOP(r)                                             largest torque at this flux limit
-    t      = torque_gain*|torque_ref|/top                       limited to 1
-    i_d, i_q = table(r, t)                                      bilinear; i_q with the sign of torque_ref
+    t      = torque_gain*|torque_now|/top                       limited to 1
+    i_d, i_q = table(r, t)                                      bilinear; i_q with the sign of torque_now
     torque_max = (2 - torque_gain)*top                          limit of the speed regulator, in torque mode as well
     share += k_voltage*((u_share*u_max)**2 - u_d**2 - u_q**2)   within share_min..1: the slow voltage loop
-    torque_gain += k_torque*(torque_ref - torque)*torque_ref    within 1/2..3/2, where |omega_me| >= omega_learn and
+    torque_gain += k_torque*(torque_now - torque)*torque_now    within 1/2..3/2, where |omega_me| >= omega_learn and
                                                                 u_d**2 + u_q**2 <= 3/4*(u_share*u_max)**2
 
 The table is computed offline (golden_model/torque_table.py): maximum torque per ampere, current circle, voltage circle
@@ -78,6 +79,7 @@ BLANK = np.zeros((2, SIZE), np.int64)
 class State(NamedTuple):
     share: int = SHARE.hi
     torque_gain: int = ONE
+    torque_now: int = 0  # PU
 
 
 @kernel
@@ -98,7 +100,10 @@ def ratio(dividend, divisor):
 def step_table(state, inputs, regs, table):
     """One sample with ``table`` (2, SIZE): (next state, outputs)."""
     x, r = inputs, regs
-    speed, torque_size = abs(x.omega_me), abs(x.torque_ref)
+    torque_now = clamp(x.torque_ref, state.torque_now - r.torque_step, state.torque_now + r.torque_step)
+    if not x.run:
+        torque_now = 0
+    speed = abs(x.omega_me)
     gain = state.torque_gain >> DROP_GAIN
     reach = ((state.share >> DROP_SHARE) * x.u_max) >> (2 * RATIO_BITS - REACH_BITS)
     flux = ratio((reach * r.k_flux) >> DROP_REACH, speed)
@@ -106,7 +111,7 @@ def step_table(state, inputs, regs, table):
     row, down = row_at >> RATIO_BITS, (row_at >> (RATIO_BITS - COLUMN_BITS)) & ((1 << COLUMN_BITS) - 1)
     base = row * WORDS
     top = max(0, between(table[0, base + COLUMNS], table[0, base + WORDS + COLUMNS], down))
-    asked = (torque_size * gain) >> PU_BITS
+    asked = (abs(torque_now) * gain) >> PU_BITS
     limited = asked >= top
     t = ratio(asked, top)
     column_at = (t << 5) - (t << 1)  # times COLUMNS - 1
@@ -123,7 +128,7 @@ def step_table(state, inputs, regs, table):
         down,
     )
     i_q = max(0, i_q)
-    if x.torque_ref < 0:
+    if torque_now < 0:
         i_q = -i_q
     torque_max = min(((PU_TWO - gain) * top) >> PU_BITS, PU_HI)
 
@@ -131,14 +136,14 @@ def step_table(state, inputs, regs, table):
     spare = (radius * radius) >> (DROP_E + 2)
     left = saturate((radius * radius - x.u_d * x.u_d - x.u_q * x.u_q) >> DROP_E, PU_W)
     share = clamp(state.share + round_half_up(r.k_voltage * left, DROP_STEP), r.share_min << DROP_SHARE, SHARE_HI)
-    error = saturate(x.torque_ref - x.torque, PU_W)
-    pull = saturate((error * x.torque_ref) >> PU_BITS, PU_W)
+    error = saturate(torque_now - x.torque, PU_W)
+    pull = saturate((error * torque_now) >> PU_BITS, PU_W)
     torque_gain = state.torque_gain
     if x.run and not limited and speed >= r.omega_learn and left >= spare:
         torque_gain = clamp(torque_gain + round_half_up(r.k_torque * pull, DROP_STEP), ONE // 2, ONE // 2 * 3)
     if not x.run:
         share = SHARE_HI
-    return State(share, torque_gain), (i_d, i_q, torque_max)
+    return State(share, torque_gain, torque_now), (i_d, i_q, torque_max)
 
 
 @kernel
@@ -148,13 +153,15 @@ def step(state, inputs, regs, example):
 
 
 def _point(v, state):
-    """(row, top, column) of a sample in real numbers, within the example."""
+    """(row, top, column, torque) of a sample in real numbers, within the example."""
+    now = state.torque_now * PU.lsb
+    torque = min(max(v["torque_ref"], now - v["torque_step"]), now + v["torque_step"]) if v["run"] else 0.0
     share = (state.share >> DROP_SHARE) * 2.0**-RATIO_BITS
     speed, reach = abs(v["omega_me"]), share * v["u_max"] * v["k_flux"]
     row = (ROWS - 1) * (1.0 if reach >= speed else reach / speed)
     top = max(0.0, v["EXAMPLE"] * _across(0, row, COLUMNS))
-    asked = abs(v["torque_ref"]) * (state.torque_gain >> DROP_GAIN) * PU.lsb
-    return row, top, (COLUMNS - 1) * (1.0 if asked >= top else asked / top)
+    asked = abs(torque) * (state.torque_gain >> DROP_GAIN) * PU.lsb
+    return row, top, (COLUMNS - 1) * (1.0 if asked >= top else asked / top), torque
 
 
 def _across(axis, row, column):
@@ -165,14 +172,14 @@ def _across(axis, row, column):
 
 
 def reference(v, state):
-    row, top, column = _point(v, state)
+    row, top, column, torque = _point(v, state)
     k = min(int(column), COLUMNS - 2)
     i_d, i_q = (
         v["EXAMPLE"] * ((k + 1 - column) * _across(axis, row, k) + (column - k) * _across(axis, row, k + 1))
         for axis in (0, 1)
     )
     gain = (state.torque_gain >> DROP_GAIN) * PU.lsb
-    i_q = math.copysign(max(0.0, i_q), v["torque_ref"]) if v["torque_ref"] else max(0.0, i_q)
+    i_q = max(0.0, i_q) * (-1.0 if torque < 0.0 else 1.0)
     return {"i_d_table": i_d, "i_q_table": i_q, "torque_max": min((2.0 - gain) * top, PU.hi * PU.lsb)}
 
 
@@ -200,6 +207,7 @@ def stimuli(rng, _config):
     """Every row and column and both edges of each, limits of torque, flux and state, zero speed, learning and stop."""
     calm = {"u_max": 37000, "u_d": -9000, "u_q": 30000, "run": 1, "k_flux": 3 << 16, "u_share": 64000}
     calm |= {"k_voltage": 900, "k_torque": 5000, "share_min": 20000, "omega_learn": 9000, "torque": 12000}
+    calm |= {"torque_step": PU.hi}
     rows = []
     for k in range(150):
         speed = int(37000 * 3 / (1 + k % 75) * 1.3) + int(rng.integers(0, 40))
@@ -218,6 +226,7 @@ def stimuli(rng, _config):
         wide = int(2 ** rng.uniform(1, 17))
         row = {**calm, "omega_me": int(rng.integers(-131072, 131072)), "torque_ref": int(rng.integers(-wide, wide))}
         row |= {"torque": int(rng.integers(-wide, wide)), "k_flux": int(2 ** rng.uniform(10, 21))}
+        row |= {"torque_step": int(2 ** rng.uniform(0, 17))}
         rows.append(row | {"u_d": int(rng.integers(-60000, 60000)), "k_torque": int(2 ** rng.uniform(0, 24))})
     return rows
 
@@ -240,6 +249,7 @@ REGISTERS = (
     Port("share_min", Format(0, 0, 16), doc="least part of the flux limit that the voltage loop leaves"),
     Port("k_torque", KI, doc="gain of the torque correction per sample"),
     Port("omega_learn", PU, lo=0, doc="the torque correction is held below this speed"),
+    Port("torque_step", PU, lo=0, doc="largest change of the torque reference per sample"),
     Port("table_word", Format(0, 31, 0), doc="a word of the torque table: bits 17-0 value, 28-18 address, 29 0 for i_d"
          " and 1 for i_q, 30 write"),
 )  # fmt: skip

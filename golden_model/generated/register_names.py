@@ -143,6 +143,7 @@ ADDRESSES = {
     "omega_learn": 0x268,
     "table_word": 0x26C,
     "v_start": 0x270,
+    "torque_step": 0x274,
     "encoder": 0x400,
     "currents": 0x404,
     "spi_lines": 0x408,

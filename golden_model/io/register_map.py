@@ -110,8 +110,8 @@ _SETTINGS = """
     228 emf_min       22c emf_i          230 emf_w        234 emf_samples    238 emf_l
     240 double_update
     250 use_table     254 k_flux         258 u_share      25c k_voltage      260 share_min    264 k_torque
-    268 omega_learn   26c table_word     270 v_start
-"""  # 23c, 244 to 24c and 274 to 3fc are free
+    268 omega_learn   26c table_word     270 v_start        274 torque_step
+"""  # 23c, 244 to 24c and 278 to 3fc are free
 _COMMANDS = {
     "enable": (0x040, Kind.COMMAND),
     "clear_trip": (0x044, Kind.PULSE),

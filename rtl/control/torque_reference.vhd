@@ -1,9 +1,10 @@
 -- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: from torque to current references at the least current, above base speed too, by a table of the motor.
---   r = share*u_max*k_flux/|omega_me|;  top = TOP(r);  t = torque_gain*|torque_ref|/top;  i_d, i_q = table(r, t)
+--   torque_now moves to torque_ref by torque_step in a sample at most;  zero with run = 0
+--   r = share*u_max*k_flux/|omega_me|;  top = TOP(r);  t = torque_gain*|torque_now|/top;  i_d, i_q = table(r, t)
 --   torque_max = (2 - torque_gain)*top
 --   share       += k_voltage*((u_share*u_max)**2 - u_d**2 - u_q**2)    within share_min..1;  1 with run = 0
---   torque_gain += k_torque*(torque_ref - torque)*torque_ref           within 1/2..3/2, where |omega_me| >= omega_learn
+--   torque_gain += k_torque*(torque_now - torque)*torque_now           within 1/2..3/2, where |omega_me| >= omega_learn
 --                                                                      and |u|**2 <= 3/4*(u_share*u_max)**2
 -- Two multipliers and one divider, two bits of the quotient a clock, are used one after the other.  Each of two block
 -- RAMs holds a current of the table; table_word writes one word at every clock in which its bit 30 is set.
@@ -39,6 +40,7 @@ entity torque_reference is
     share_min   : in  unsigned(15 downto 0);
     k_torque    : in  unsigned(KI_W - 1 downto 0);
     omega_learn : in  signed(PU_W - 1 downto 0);
+    torque_step : in  signed(PU_W - 1 downto 0);
     table_word  : in  unsigned(30 downto 0);
     out_valid   : out std_logic;
     i_d_table   : out signed(PU_W - 1 downto 0);
@@ -84,6 +86,7 @@ architecture rtl of torque_reference is
   type state_t is record
     share       : unsigned(SHARE_W - 1 downto 0);
     torque_gain : unsigned(GAIN_W - 1 downto 0);
+    torque_now  : word_t;
   end record state_t;
 
   signal state : state_t;
@@ -171,6 +174,7 @@ begin
   process (clk)
     variable reach : signed(PU_W - 1 downto 0);
     variable limit : signed(KI_W + PU_W downto 0);
+    variable change : wide_t;
     variable error : signed(PU_W - 1 downto 0);
   begin
     if rising_edge(clk) then
@@ -179,22 +183,32 @@ begin
       p_a <= x_a * y_a;
       p_b <= x_b * y_b;
 
-      -- Stage 1: share*u_max;  torque_gain*|torque_ref|
+      -- Stage 1: torque_now;  share*u_max;  stage 2: torque_gain*|torque_now|
+      change := resize(torque_ref, PU_W + 1) - state.torque_now;
       if valid(0) = '1' then
         x_a   <= resize(signed('0' & state.share(SHARE_W - 1 downto SHARE_W - 16)), x_a'length);
         y_a   <= signed(resize(u_max, PU_W));
-        x_b   <= abs(resize(torque_ref, x_b'length));
-        y_b   <= gain;
         speed <= resize(magnitude(omega_me), PU_W);
+
+        state.torque_now <= resize(state.torque_now + within(change, unsigned(torque_step), 0), PU_W);
+        if run = '0' then
+          state.torque_now <= (others => '0');
+        end if;
+      end if;
+      if valid(1) = '1' then
+        x_b <= abs(resize(state.torque_now, x_b'length));
+        y_b <= gain;
+      end if;
+      if valid(3) = '1' then
+        asked <= unsigned(p_b(16 + PU_W - 1 downto 16));
       end if;
 
       -- Stage 3: share*u_max*k_flux
       reach := resize(shift_right(p_a, 32 - TORQUE_REFERENCE_REACH_BITS), PU_W);
       if valid(2) = '1' then
-        x_a   <= signed('0' & k_flux);
-        y_a   <= reach;
-        asked <= unsigned(p_b(16 + PU_W - 1 downto 16));
-        fast  <= '1' when signed('0' & speed) >= omega_learn else '0';
+        x_a  <= signed('0' & k_flux);
+        y_a  <= reach;
+        fast <= '1' when signed('0' & speed) >= omega_learn else '0';
       end if;
 
       -- Stage 5: the flux limit's dividend and divisor;  stages 6 to 13: division
@@ -260,8 +274,8 @@ begin
         y_b  <= resize(shift_right(p_b, 16), PU_W);
       end if;
 
-      -- Stages 24 to 28: left = (u_share*u_max)**2 - u_d**2 - u_q**2;  pull = (torque_ref - torque)*torque_ref
-      error := saturate(resize(torque_ref, PU_W + 1) - torque, PU_W);
+      -- Stages 24 to 28: left = (u_share*u_max)**2 - u_d**2 - u_q**2;  pull = (torque_now - torque)*torque_now
+      error := saturate(resize(state.torque_now, PU_W + 1) - torque, PU_W);
       if valid(23) = '1' then
         x_b <= resize(u_d, x_b'length);
         y_b <= u_d;
@@ -275,7 +289,7 @@ begin
       if valid(25) = '1' then
         sum <= resize(sum - p_b, sum'length);
         x_b <= resize(error, x_b'length);
-        y_b <= torque_ref;
+        y_b <= state.torque_now;
       end if;
       if valid(26) = '1' then
         sum <= resize(sum - p_b, sum'length);
@@ -359,7 +373,7 @@ begin
       if valid(39) = '1' then
         if next_q < 0 then
           next_q <= (others => '0');
-        elsif torque_ref < 0 then
+        elsif state.torque_now < 0 then
           next_q <= -next_q;
         end if;
       end if;
@@ -374,6 +388,7 @@ begin
         dividing            <= '0';
         state.share         <= FULL;
         state.torque_gain   <= ONE;
+        state.torque_now    <= (others => '0');
         i_d_table           <= (others => '0');
         i_q_table           <= (others => '0');
         torque_max          <= (others => '0');

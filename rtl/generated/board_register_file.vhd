@@ -698,6 +698,10 @@ begin
         settings.v_start <= unsigned(held(16 downto 0));
         written(156)     <= '1';
       end if;
+      if (row(19) and column(5) and not sample_busy) = '1' then
+        settings.torque_step <= signed(held(17 downto 0));
+        written(157)         <= '1';
+      end if;
       if (row(32) and column(4)) = '1' then
         clear_encoder <= held(0);
       end if;
@@ -1042,6 +1046,7 @@ begin
         settings.omega_learn      <= (others => '0');
         settings.table_word       <= (others => '0');
         settings.v_start          <= (others => '0');
+        settings.torque_step      <= (others => '0');
         clear_encoder             <= '0';
         take_snapshot             <= '0';
         position_source           <= '0';

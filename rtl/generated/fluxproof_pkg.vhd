@@ -97,6 +97,7 @@ package fluxproof_pkg is
     share_min        : unsigned(U_MAX_W - 1 downto 0);  -- least part of the flux limit that the voltage loop leaves
     k_torque         : unsigned(KI_W - 1 downto 0);  -- gain of the torque correction per sample
     omega_learn      : signed(PU_W - 1 downto 0);  -- the torque correction is held below this speed
+    torque_step      : signed(PU_W - 1 downto 0);  -- largest change of the torque reference per sample
     table_word       : unsigned(30 downto 0);  -- a word of the torque table: bits 17-0 value, 28-18 address, 29 0 for i_d and 1 for i_q, 30 write
     kp_d             : unsigned(KP_W - 1 downto 0);  -- proportional gain, d axis
     ki_d             : unsigned(KI_W - 1 downto 0);  -- integral gain times sample time, d axis

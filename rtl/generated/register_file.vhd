@@ -613,6 +613,10 @@ begin
         settings.v_start <= unsigned(held(16 downto 0));
         written(156)     <= '1';
       end if;
+      if (row(19) and column(5) and not sample_busy) = '1' then
+        settings.torque_step <= signed(held(17 downto 0));
+        written(157)         <= '1';
+      end if;
 
       if rst = '1' then
         written                   <= (others => '0');
@@ -719,6 +723,7 @@ begin
         settings.omega_learn      <= (others => '0');
         settings.table_word       <= (others => '0');
         settings.v_start          <= (others => '0');
+        settings.torque_step      <= (others => '0');
       end if;
     end if;
   end process;
