@@ -87,7 +87,7 @@ def main() -> int:
         plane = Plane(case.truth, case.drive.machine.pole_pairs, case.drive.current_limit_a)
         rows += [*figures.loss(case, plane), *figures.wrong_maps(case, plane), *figures.start(case, plane)]
         more, curves[case.name] = figures.curve(case, plane)
-        rows += [*more, *figures.hostile(case, plane)]
+        rows += [*more, *figures.hostile(case, plane, 0.0), *figures.hostile(case, plane, 1e-3)]
         more, sags[case.name] = figures.sag(case, plane)
         rows += more
     if "--no-rtl" not in sys.argv[1:]:
