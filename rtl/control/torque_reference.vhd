@@ -126,20 +126,29 @@ architecture rtl of torque_reference is
   signal most           : word_t;
   signal sum            : signed(36 downto 0);
   signal left, pull     : word_t;
+  signal calm           : std_logic;  -- the voltage is well within the circle
   signal spare          : word_t;  -- a quarter of (u_share*u_max)**2
   signal share_moved    : signed(STEP_W downto 0);
   signal gain_moved     : signed(STEP_W downto 0);
   signal least          : unsigned(SHARE_W - 1 downto 0);
   signal next_d, next_q : word_t;
 
+  -- a < b, as the borrow of a subtraction
+  function less (a : unsigned; b : unsigned) return std_logic is
+    constant WIDTH   : positive := maximum(a'length, b'length) + 1;
+    constant DIFFERS : unsigned(WIDTH - 1 downto 0) := resize(a, WIDTH) - resize(b, WIDTH);
+  begin
+    return DIFFERS(WIDTH - 1);
+  end function;
+
   -- One step of the division: bit of the quotient, and the new rest below it.
   function divided (remainder : size_t; by : size_t) return unsigned is
-    constant LESS : unsigned(PU_W downto 0) := (remainder & '0') - ('0' & by);
+    constant TRIAL : unsigned(PU_W + 1 downto 0) := ('0' & remainder & '0') - ("00" & by);
   begin
-    if (remainder & '0') < ('0' & by) then
+    if TRIAL(PU_W + 1) = '1' then
       return '0' & remainder(PU_W - 2 downto 0) & '0';
     end if;
-    return '1' & LESS(PU_W - 1 downto 0);
+    return '1' & TRIAL(PU_W - 1 downto 0);
   end function;
 begin
   valid(0) <= in_valid;
@@ -208,13 +217,13 @@ begin
       if valid(2) = '1' then
         x_a  <= signed('0' & k_flux);
         y_a  <= reach;
-        fast <= '1' when signed('0' & speed) >= omega_learn else '0';
+        fast <= not less(speed, unsigned(omega_learn));
       end if;
 
       -- Stage 5: the flux limit's dividend and divisor;  stages 6 to 13: division
       limit := shift_right(p_a, TORQUE_REFERENCE_DROP_REACH);
       if valid(4) = '1' then
-        whole    <= '1' when limit >= signed('0' & speed) else '0';
+        whole    <= not less(unsigned(limit(KI_W downto 0)), speed);
         rest     <= unsigned(limit(PU_W - 1 downto 0));
         divisor  <= speed;
         dividing <= '1';
@@ -255,7 +264,7 @@ begin
 
       -- Stage 20: dividend and divisor of t;  stages 21 to 28: division
       if valid(19) = '1' then
-        whole    <= '1' when asked >= unsigned(top) else '0';
+        whole    <= not less(asked, unsigned(top));
         rest     <= asked;
         divisor  <= unsigned(top);
         dividing <= '1';
@@ -298,6 +307,9 @@ begin
         left <= saturate(shift_right(sum, TORQUE_REFERENCE_DROP_E), PU_W);
         pull <= saturate(shift_right(p_b, 16), PU_W);
       end if;
+      if valid(28) = '1' then
+        calm <= not left(PU_W - 1) and not less(unsigned(left), unsigned(spare));
+      end if;
 
       -- Stages 29 to 32: share and torque_gain of the next sample;  stage 29: the column of t
       if valid(28) = '1' then
@@ -315,18 +327,18 @@ begin
       end if;
       if valid(31) = '1' then
         state.share <= unsigned(share_moved(SHARE_W - 1 downto 0));
-        if share_moved < signed('0' & least) then
+        if share_moved(STEP_W) = '1' or less(unsigned(share_moved(STEP_W - 1 downto 0)), least) = '1' then
           state.share <= least;
-        elsif share_moved > signed('0' & FULL) then
+        elsif share_moved(STEP_W - 1 downto SHARE_W) /= 0 then
           state.share <= FULL;
         end if;
         if run = '0' then
           state.share <= FULL;
-        elsif whole = '0' and fast = '1' and left >= spare then
+        elsif whole = '0' and fast = '1' and calm = '1' then
           state.torque_gain <= unsigned(gain_moved(GAIN_W - 1 downto 0));
-          if gain_moved < signed('0' & GAIN_MIN) then
+          if gain_moved(STEP_W) = '1' or gain_moved(STEP_W - 1 downto GAIN_W - 2) = 0 then
             state.torque_gain <= GAIN_MIN;
-          elsif gain_moved > signed('0' & GAIN_MAX) then
+          elsif gain_moved(STEP_W - 1 downto GAIN_W) /= 0 or gain_moved(GAIN_W - 1 downto GAIN_W - 2) = "11" then
             state.torque_gain <= GAIN_MAX;
           end if;
         end if;
