@@ -69,7 +69,9 @@ def flux_of(path: str | None, drive: Drive) -> torque_table.Flux | None:
     if path is None:
         return None
     if not drive.core.references:
-        raise DriveError("--flux-map makes a torque table, which the drive file does not ask for: [core] references = true")
+        raise DriveError(
+            "--flux-map makes a torque table, which the drive file does not ask for: [core] references = true"
+        )
     chart = read_flux_map(Path(path))
     reach = min(-chart.i_d_a[0], chart.i_q_a[-1])
     if reach < drive.current_limit_a * (1.0 - 1e-6):

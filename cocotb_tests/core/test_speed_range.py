@@ -91,7 +91,9 @@ def test_above_base_speed_there_is_torque_within_the_circle_and_it_is_released()
     u = np.hypot(result.observed["u_d"], result.observed["u_q"])
     assert (u <= result.observed["u_max"] + 1).all() and not result.observed["sample_trip"].any()
     n = 4000
-    speed = DRIVE.machine.rated_speed_rad_s * np.concatenate([np.linspace(0.3, 2.5, n // 2), np.linspace(2.5, 0.3, n // 2)])
+    speed = DRIVE.machine.rated_speed_rad_s * np.concatenate(
+        [np.linspace(0.3, 2.5, n // 2), np.linspace(2.5, 0.3, n // 2)]
+    )
     slow = simulate(DRIVE, SET, scene(DRIVE, np.full(n, 1.0), speed), mode=IMPOSED_SPEED)
     assert slow.plant["i_d"].min() < -3.0 and abs(slow.plant["i_d"][-200:].mean()) < 0.1
 

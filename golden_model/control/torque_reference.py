@@ -272,8 +272,13 @@ BLOCK = Block(
     latency=42,
     interval=43,
     constants={
-        "ROWS": ROWS, "WORDS": WORDS, "COLUMN_BITS": COLUMN_BITS, "DROP_E": DROP_E,
-        "DROP_REACH": DROP_REACH, "DROP_STEP": DROP_STEP, "REACH_BITS": REACH_BITS,
+        "ROWS": ROWS,
+        "WORDS": WORDS,
+        "COLUMN_BITS": COLUMN_BITS,
+        "DROP_E": DROP_E,
+        "DROP_REACH": DROP_REACH,
+        "DROP_STEP": DROP_STEP,
+        "REACH_BITS": REACH_BITS,
     },  # fmt: skip
     roms={"EXAMPLE_D": (PU, [int(v) for v in EXAMPLE[0]]), "EXAMPLE_Q": (PU, [int(v) for v in EXAMPLE[1]])},
     configs=({"EXAMPLE": 1}, {"EXAMPLE": 0}),

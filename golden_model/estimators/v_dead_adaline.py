@@ -115,7 +115,12 @@ def step(state, inputs, regs):
     v_comp = round_half_up(clamp(asked, 0, limit), TO_LEG) if r.compensate else 0
     v_leg = saturate(v_comp + round_half_up(fine, FINE_TO_LEG), V_LEG_W)
     limited = 1 if r.compensate and asked > limit else 0
-    return State(lp_u, lp_d, v_dead, v_sum, 1 if x.run else state.begun), (round_half_up(fine, FINE_TO_LEG), v_comp, v_leg, limited)
+    return State(lp_u, lp_d, v_dead, v_sum, 1 if x.run else state.begun), (
+        round_half_up(fine, FINE_TO_LEG),
+        v_comp,
+        v_leg,
+        limited,
+    )
 
 
 def filtered(lp, x, k_lp):

@@ -69,7 +69,9 @@ def picture(curves: dict, sags: dict) -> str:
 def page(rows: list[dict], image: str) -> str:
     """The page with the table of all figures."""
     cells = "".join(
-        "<tr>" + "".join(f"<td>{escape(str(v))}</td>" for v in (*list(r.values())[:-1], "yes" if r["pass"] else "NO")) + "</tr>"
+        "<tr>"
+        + "".join(f"<td>{escape(str(v))}</td>" for v in (*list(r.values())[:-1], "yes" if r["pass"] else "NO"))
+        + "</tr>"
         for r in rows
     )
     head = "".join(f"<th>{name}</th>" for name in rows[0])
@@ -96,7 +98,9 @@ def main() -> int:
     write_json(OUT / "speed_range.json", rows)
     write_text(OUT / "speed_range.html", page(rows, picture(curves, sags)))
     for r in rows:
-        print(f"{'' if r['pass'] else 'MISS':5}{r['experiment']:42} {r['figure']:52} {r['ours']:>9g} {r['target']:>7g} {r['unit']}")
+        print(
+            f"{'' if r['pass'] else 'MISS':5}{r['experiment']:42} {r['figure']:52} {r['ours']:>9g} {r['target']:>7g} {r['unit']}"
+        )
     missed = sum(not r["pass"] for r in rows)
     print(f"{len(rows) - missed} of {len(rows)} figures reach their target; {OUT / 'speed_range.html'}")
     return int(missed > 0)

@@ -156,14 +156,26 @@ def wrong_maps(case: Case, plane: torque_table.Plane) -> Iterator[dict]:
     for name, plant in plants.items():
         run, n = play(case, asked, np.full(len(asked), speed), plant=plant), len(asked) // 3
         wrong = [
-            abs(run.plant["torque"][(k + 1) * n - n // 4 : (k + 1) * n].mean() - asked[(k + 1) * n - 1]) for k in range(3)
+            abs(run.plant["torque"][(k + 1) * n - n // 4 : (k + 1) * n].mean() - asked[(k + 1) * n - 1])
+            for k in range(3)
         ]
-        yield row(f"torque, {case.name}, {name}", "asked against delivered, of the largest", 100.0 * max(wrong) / top, 2.0, "%")
+        yield row(
+            f"torque, {case.name}, {name}",
+            "asked against delivered, of the largest",
+            100.0 * max(wrong) / top,
+            2.0,
+            "%",
+        )
 
 
 def curve(case: Case, plane: torque_table.Plane, seconds: float = 0.5) -> tuple[list[dict], dict]:
     """The largest torque over speed, of what the plant's map allows; the arrays of the picture."""
-    base, top, rows, picture = base_speed(case, plane), plane.most(np.inf)[0], [], {"speed": [], "torque": [], "most": []}
+    base, top, rows, picture = (
+        base_speed(case, plane),
+        plane.most(np.inf)[0],
+        [],
+        {"speed": [], "torque": [], "most": []},
+    )
     held = case.drive.bases.omega_me_rad_s * 1.98 / case.drive.machine.pole_pairs
     for times in (0.5, 0.9, *SPEEDS):
         speed = times * base
@@ -177,10 +189,21 @@ def curve(case: Case, plane: torque_table.Plane, seconds: float = 0.5) -> tuple[
             picture[name].append(value)
         if times not in SPEEDS or most < 0.02 * top:
             continue
-        rows.append(row(f"speed range, {case.name}, {times:g} x base", "torque of what the map allows", 100.0 * torque / most, 99.0, "%", True))
+        rows.append(
+            row(
+                f"speed range, {case.name}, {times:g} x base",
+                "torque of what the map allows",
+                100.0 * torque / most,
+                99.0,
+                "%",
+                True,
+            )
+        )
         ripple = run.plant["i_q"][-n // 4 :].std()
         share = 100.0 * ripple / case.drive.machine.rated_current_a
-        rows.append(row(f"speed range, {case.name}, {times:g} x base", "i_q at the circle, rms of rated", share, 4.0, "%"))
+        rows.append(
+            row(f"speed range, {case.name}, {times:g} x base", "i_q at the circle, rms of rated", share, 4.0, "%")
+        )
         size = np.hypot(run.observed["u_d"], run.observed["u_q"]) / np.maximum(run.observed["u_max"], 1)
         rows.append(row(f"speed range, {case.name}, {times:g} x base", "voltage of the circle", size.max(), 1.001, "1"))
     return rows, picture
@@ -209,7 +232,13 @@ def hostile(case: Case, plane: torque_table.Plane, step_s: float, demands: int =
     name = f"demands beyond, bus in {1e3 * step_s:g} ms, {case.name}"
     yield row(name, "trips", tripped, 0, "1")
     yield row(name, "peak of the current, of its limit", size.max() / case.drive.current_limit_a, 1.03, "1")
-    yield row(name, "current, 99.9th percentile, of its limit", np.percentile(seen, 99.9) / case.drive.current_limit_a, 1.03, "1")
+    yield row(
+        name,
+        "current, 99.9th percentile, of its limit",
+        np.percentile(seen, 99.9) / case.drive.current_limit_a,
+        1.03,
+        "1",
+    )
     yield row(name, "samples of the wrong sign after 8 ms of 10", 100.0 * wrong.mean(), 0.0, "%")
 
 
@@ -232,7 +261,9 @@ def sag(case: Case, plane: torque_table.Plane) -> tuple[list[dict], dict]:
     freed = play(case, asked, ramp)
     braking = -freed.plant["torque"][at + round(5e-3 / t_s) :].min()
     name = f"release at {times:g} x base, {case.name}"
-    rows.append(row(name, "largest braking torque from 5 ms on, of the largest", 100.0 * max(braking, 0.0) / top, 5.0, "%"))
+    rows.append(
+        row(name, "largest braking torque from 5 ms on, of the largest", 100.0 * max(braking, 0.0) / top, 5.0, "%")
+    )
     return rows, {"t": (np.arange(n) - at) * t_s * 1e3, "current": size / limit, "torque": run.plant["torque"] / top}
 
 
