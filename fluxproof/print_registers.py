@@ -39,7 +39,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--flux-map",
         metavar="FILE",
-        help="flux_map.csv of the machine: the torque table of [core] references = true is made of it, not of L_d and L_q",
+        help="flux_map.csv of the machine: the torque table of [core] references = true is made of it",
     )
     parser.add_argument("--json", metavar="FILE", help="write the same to FILE, machine-readable")
 

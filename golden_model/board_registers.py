@@ -89,7 +89,7 @@ def board_registers(drive: Drive) -> dict[str, int]:
 
 
 def board_set(drive: Drive, flux=None) -> RegisterSet:
-    """``registers(drive, flux)``, with the rows of the front ends where the drive has some; ``values`` are the core's."""
+    """``registers(drive, flux)``, with the rows of the front ends where there are some; ``values`` are the core's."""
     core = registers(drive, flux)
     if not has_board(drive):
         return core

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golden_model.control.torque_reference import COLUMNS, ROWS, SIZE, WORDS, WRITE
 from golden_model.control.torque_reference import ADDRESS as ADDRESS_BIT
-from golden_model.control.torque_reference import SELECT
+from golden_model.control.torque_reference import COLUMNS, ROWS, SELECT, SIZE, WORDS, WRITE
 from golden_model.formats import PU
 
 Flux = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]  # (i_d, i_q) [A] -> (lambda_d, lambda_q) [Wb]

@@ -26,7 +26,7 @@ SET = registers(DRIVE)
 
 @pytest.mark.parametrize("l_d, l_q, psi", [(20e-3, 20e-3, 0.165), (10e-3, 40e-3, 0.06), (10e-3, 60e-3, 0.0)])
 def test_table_has_the_least_current_within_both_circles(l_d, l_q, psi):
-    """Surface, interior and reluctance machine: each point gives its torque, and no point of a grid gives it cheaper."""
+    """Surface, interior and reluctance machine: each point gives its torque, no point of a grid gives it cheaper."""
     machine = dataclasses.replace(DRIVE.machine, inductance_d_h=l_d, inductance_q_h=l_q, magnet_flux_wb=psi)
     flux, i_max = torque_table.linear(machine), 5.0
     table = torque_table.build(flux, machine.pole_pairs, i_max)
@@ -49,7 +49,7 @@ def test_table_has_the_least_current_within_both_circles(l_d, l_q, psi):
 
 
 def test_references_of_any_table_stay_in_the_current_circle():
-    """Random words, torques, speeds: what reaches the current regulators is within i_max, and i_q has the torque's sign."""
+    """Random words, torques, speeds: references are within i_max, and i_q has the torque's sign."""
     rng, i_max = np.random.default_rng(3), 30000
     table = rng.integers(PU.lo, PU.hi + 1, BLANK.shape)
     state, circle, late = torque_reference.State(), current_limit.State(), current_reference.State()
@@ -79,7 +79,7 @@ def run(torque_nm, times, seconds=0.4, **changes):
 
 @pytest.mark.parametrize("torque_nm, times", [(2.0, 0.5), (-2.0, 0.5), (2.0, 2.0), (-2.0, 2.0)])
 def test_torque_is_the_one_asked_for(torque_nm, times):
-    """Newton metres of both signs below and above base speed, within 2 % of the rated 3.9 Nm; without the table none."""
+    """Newton metres of both signs below and above base speed, within 2 % of the rated 3.9 Nm."""
     _, torque = run(torque_nm, times)
     assert torque == pytest.approx(torque_nm, abs=0.08)
 

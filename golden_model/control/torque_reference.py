@@ -16,8 +16,8 @@ and maximum torque per volt are in it, for any machine.  ROWS flux limits, COLUM
 columns holds TOP.  A point between four points of a disc is in that disc, so references stay in the current circle of
 the table; current_limit keeps them in that of ``i_max`` whatever the table holds.  Where map and machine differ the
 voltage loop takes flux away, and torque_gain corrects the torque with the estimated flux linkage: least mean squares,
-so that nothing is learnt at zero torque and the sign of a torque never changes.  It is held near the voltage circle, where
-the minimum pulse keeps legs from switching: their dead time is then compensated without being lost, and the estimate
+so that nothing is learnt at zero torque and the sign of a torque never changes.  It is held near the voltage circle,
+where the minimum pulse keeps legs from switching: their dead time is then compensated without being lost, and the estimate
 is up to 7 % off (docs/speed_range.md).  ``run`` = 0: share is 1, no learning.
 Everything acts on the next sample but one (see current_reference).
 
@@ -184,7 +184,7 @@ def reference(v, state):
 
 
 def bound(v, state):
-    """Floors of reach, dividends and both fractions, times the steepest step of the example between rows and columns."""
+    """Floors of reach, dividends and both fractions, times the steepest step of the example."""
     fraction = 2.0**-COLUMN_BITS
     speed = max(abs(v["omega_me"]), PU.lsb)
     flux = (2.0**-REACH_BITS * v["k_flux"] + 2.0 * PU.lsb) / speed + 2.0**-RATIO_BITS

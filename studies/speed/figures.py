@@ -73,7 +73,7 @@ def base_speed(case: Case, plane: torque_table.Plane) -> float:
 
 
 def possible(case: Case, plane: torque_table.Plane, speed: float) -> float:
-    """The largest torque that the plant's map allows in both circles at a mechanical speed, resistance included [Nm]."""
+    """The largest torque [Nm] that the plant's map allows in both circles at a mechanical speed, with R."""
     m, u = case.drive.machine, case.drive.inverter.dc_bus_v / np.sqrt(3.0)
     i_d = np.broadcast_to(plane.i_d[:, None], plane.i_q.shape)
     lambda_d, lambda_q = case.truth(i_d, plane.i_q)
