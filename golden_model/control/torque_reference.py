@@ -17,7 +17,7 @@ columns holds TOP.  A point between four points of a disc is in that disc, so re
 the table; current_limit keeps them in that of ``i_max`` whatever the table holds.  Where map and machine differ the
 voltage loop takes flux away, and torque_gain corrects the torque with the estimated flux linkage: least mean squares,
 so that nothing is learnt at zero torque and the sign of a torque never changes.  It is held near the voltage circle,
-where the minimum pulse keeps legs from switching: their dead time is then compensated without being lost, and the estimate
+where the minimum pulse keeps legs from switching: their dead time is compensated without being lost, and the estimate
 is up to 7 % off (docs/speed_range.md).  ``run`` = 0: share is 1, no learning.
 Everything acts on the next sample but one (see current_reference).
 
