@@ -10,10 +10,12 @@ import argparse
 import json
 from pathlib import Path
 
+from fluxproof.diagnosis.ground.plant_keys import read_flux_map
 from fluxproof.diagnosis.whole_drive import load_drive
 from fluxproof.files import refuse_overwriting, write_json
 from fluxproof.quote import c_comment, put
 from fluxproof.stage import alone
+from golden_model import torque_table
 from golden_model.board_registers import board_generics, board_set, has_board
 from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError
@@ -34,6 +36,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         default="table",
         help="table (default); c: a header with an array to load; json: a list of name, address, value",
     )
+    parser.add_argument(
+        "--flux-map",
+        metavar="FILE",
+        help="flux_map.csv of the machine: the torque table of [core] references = true is made of it",
+    )
     parser.add_argument("--json", metavar="FILE", help="write the same to FILE, machine-readable")
 
 
@@ -41,11 +48,11 @@ def run(args: argparse.Namespace) -> int:
     """Print the table and write the JSON file if one is asked for."""
     drive = load_drive(args.drive)
     try:
-        result = board_set(drive)
+        result = board_set(drive, flux_of(args.flux_map, drive))
     except DriveError as error:
         raise DriveError(f"{args.drive}: {error}") from None
     if args.json:
-        refuse_overwriting([args.json], [args.drive])
+        refuse_overwriting([args.json], [args.drive, *([args.flux_map] if args.flux_map else [])])
         with alone(Path(args.json)) as file:
             write_json(file, as_json(drive, result))
     if args.format == "c":
@@ -57,9 +64,29 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def flux_of(path: str | None, drive: Drive) -> torque_table.Flux | None:
+    """The flux linkage of a map's file; DriveError where the drive has no torque table or the map ends too early."""
+    if path is None:
+        return None
+    if not drive.core.references:
+        raise DriveError(
+            "--flux-map makes a torque table, which the drive file does not ask for: [core] references = true"
+        )
+    chart = read_flux_map(Path(path))
+    reach = min(-chart.i_d_a[0], chart.i_q_a[-1])
+    if reach < drive.current_limit_a * (1.0 - 1e-6):
+        raise DriveError(
+            f"{path}: the map ends at i_d = {chart.i_d_a[0]:g} A, i_q = {chart.i_q_a[-1]:g} A: expected is a map up to "
+            f"the current limit, {drive.current_limit_a:g} A"
+        )
+    return torque_table.measured(chart.i_d_a, chart.i_q_a, chart.psi_d_wb, chart.psi_q_wb)
+
+
 def load_list(result: RegisterSet) -> list[dict]:
     """The writes of a driver: byte address and integer of each register."""
-    return [{"name": r.name, "address": ADDRESSES[r.name], "value": r.integer} for r in result.rows]
+    words = torque_table.table_words(result.table) if result.config.references else []
+    table = [{"name": "table_word", "address": ADDRESSES["table_word"], "value": word} for word in words]
+    return table + [{"name": r.name, "address": ADDRESSES[r.name], "value": r.integer} for r in result.rows]
 
 
 def c_lines(name: str, drive: Drive, result: RegisterSet) -> list[str]:
@@ -92,7 +119,22 @@ def c_lines(name: str, drive: Drive, result: RegisterSet) -> list[str]:
         "static const struct fluxproof_setting fluxproof_settings[] = {",
         *rows,
         "};",
+        *(torque_table_lines(result) if result.config.references else []),
         "#endif",
+    ]
+
+
+def torque_table_lines(result: RegisterSet) -> list[str]:
+    """The torque table as the values that the register table_word gets one after the other, before use_table."""
+    words = [f"0x{word:08X}" for word in torque_table.table_words(result.table)]
+    lines = ["    " + ", ".join(words[k : k + 8]) + "," for k in range(0, len(words), 8)]
+    return [
+        "",
+        "/* Write each to table_word, with the gates off. */",
+        "#define FLUXPROOF_TORQUE_TABLE 1",
+        "static const uint32_t fluxproof_torque_table[] = {",
+        *lines,
+        "};",
     ]
 
 

@@ -88,9 +88,9 @@ def board_registers(drive: Drive) -> dict[str, int]:
     return registers(drive).values._asdict() | core_changes(drive) | front_end_registers(drive)
 
 
-def board_set(drive: Drive) -> RegisterSet:
-    """``registers(drive)``, with the rows of the front ends where the drive has some; ``values`` are the core's."""
-    core = registers(drive)
+def board_set(drive: Drive, flux=None) -> RegisterSet:
+    """``registers(drive, flux)``, with the rows of the front ends where there are some; ``values`` are the core's."""
+    core = registers(drive, flux)
     if not has_board(drive):
         return core
     changes, ports = core_changes(drive), board_map.settings()

@@ -85,6 +85,10 @@ class Control:
     speed_bandwidth_hz: float | None = positive("Hz", "speed loop; none: no speed control", None)
     speed_filter_hz: float | None = positive("Hz", "filter of the measured speed; none: no filter", None)
     current_limit_a: float | None = positive("A", "limit of the current, rated current if none", None)
+    voltage_target: float = positive("1", "part of the voltage circle used above base speed", 0.98, most=1.0)
+    weakening_bandwidth_hz: float = positive("Hz", "voltage loop above base speed", 20.0)
+    torque_rise_s: float = positive("s", "shortest time from zero to the largest torque, with the torque table", 2e-3)
+    torque_bandwidth_hz: float = not_negative("Hz", "correction of the torque by the estimated flux", 2.0)
     voltage_reserve: float = not_negative("1", "part of the voltage circle left unused", 0.0, most=0.99)
     current_kp_d_v_per_a: float | None = not_negative("V/A", "override", None)
     current_kp_q_v_per_a: float | None = not_negative("V/A", "override", None)
@@ -107,6 +111,7 @@ class Control:
     v_dead_gamma: float = not_negative("1", "proportional part of the compensation", 0.1)
     v_dead_zeta: float = not_negative("1", "gain of the minimisation per sample", 1e-4)
     v_dead_threshold_v: float | None = not_negative("V", "leg voltage below which the minimisation stops", None)
+    v_dead_start_v: float | None = not_negative("V", "leg voltage compensated from the start; see scaling.py", None)
     v_dead_limit_v: float | None = positive("V", "largest leg voltage that is compensated", None)
     psi_eta: float | None = positive("s2/rad2", "step of the psi_m Adaline, paper 000 eq. (13)", None)
     psi_min_speed_rad_s: float | None = positive("rad/s", "mechanical; psi_m is held below", None)
@@ -187,6 +192,7 @@ class Core:
     clock_hz: float = positive("Hz", "of the core; a whole multiple of twice the PWM frequency")
     updates_per_period: int = whole(1, 2, "1: sampled and updated at the valley; 2: at the valley and the peak", 1)
     estimators: bool = flag("false: field-oriented control alone; flux_mode and the compensation have no effect", True)
+    references: bool = flag("true: current references by a table of torque and flux limit, docs/speed_range.md", False)
     gate_active: int = whole(0, 1, "level of the gate pins at which a switch is on", 1)
     trip_active: int = whole(0, 1, "level of the pin trip that turns the gates off", 1)
     brake_active: int = whole(0, 1, "level of the pin brake at which the resistor is on", 1)
@@ -241,6 +247,11 @@ class Drive:
             choice.voltage_v or sensors.u_dc_range_v / 2,
             choice.omega_me_rad_s or machine.pole_pairs * machine.rated_speed_rad_s,
         )
+
+    @property
+    def torque_base_nm(self):
+        """The torque of 1.0 per unit: flux linkage and current both at their bases."""
+        return 1.5 * self.machine.pole_pairs * self.bases.flux_wb * self.bases.current_a
 
     @property
     def sample_time_s(self):

@@ -14,9 +14,11 @@ from golden_model.control import (
     chord_speed,
     current_limit,
     current_pi,
+    current_reference,
     dead_time_compensation,
     decoupling,
     speed_pi,
+    torque_reference,
     voltage_limit,
 )
 from golden_model.control.dead_time_compensation import D_D, D_Q
@@ -74,7 +76,9 @@ WIRING = {
     "trig": (sincos, ("angle", "delay")),
     "rotor_frame": (park, ("stator_frame", "trig")),
     "current_circle": (current_limit, ("latch",)),
+    "table_current": (current_reference, ("current_circle",)),
     "speed_regulator": (speed_pi, ("speed_measurement", "current_circle")),
+    "references": (torque_reference, ("speed_regulator", "bus_voltage")),
     "current_regulators": (current_pi, ("rotor_frame", "speed_regulator", "current_circle")),
     "resistance": (winding_resistance, ("latch",)),
     "merged_flux": (flux_park, ("trig",)),
@@ -167,6 +171,7 @@ class Config(NamedTuple):
     position_bits: int = 16
     carrier_half: int = 10000
     estimators: int = 1  # 0: field-oriented control alone
+    references: int = 0  # 1: current references by a table of torque and flux limit
 
 
 class Sample(NamedTuple):
@@ -233,6 +238,12 @@ class State(NamedTuple):
     v_leg: int = 0
     s_alpha: int = 0
     s_beta: int = 0
+    # The torque table's part; last, so that a state written by an older core is the beginning of one.
+    i_d_table: int = 0
+    i_q_table: int = 0
+    torque_max: int = 0
+    of_current_reference: current_reference.State = current_reference.State()
+    of_torque_reference: torque_reference.State = torque_reference.State()
 
 
 class Observed(NamedTuple):
@@ -326,18 +337,29 @@ class Given(NamedTuple):
 
 
 @kernel
-def step(state, sample, regs, config):
-    """One control period: (next state, Observed)."""
-    given = Given(
+def given_by_registers(regs):
+    """Given as the registers say it, without a front end."""
+    return Given(
         speed_given=regs.speed_given, omega_given=regs.omega_given, position_restart=regs.position_restart,
         emf_samples=regs.emf_samples,
     )  # fmt: skip
-    return step_given(state, sample, regs, config, given)
+
+
+@kernel
+def step(state, sample, regs, config):
+    """One control period: (next state, Observed)."""
+    return step_given(state, sample, regs, config, given_by_registers(regs))
 
 
 @kernel
 def step_given(state, sample, regs, config, of_speed):
     """One control period with ``of_speed`` in place of the registers: (next state, Observed)."""
+    return step_table(state, sample, regs, config, of_speed, torque_reference.BLANK)
+
+
+@kernel
+def step_table(state, sample, regs, config, of_speed, table):
+    """One control period with a torque table, (2, SIZE) as torque_reference: (next state, Observed)."""
     x, r, c = sample, regs, config
     i_a, i_b, i_c, current_at_rail = current_conditioning.step(
         x.adc_a, x.adc_b, x.adc_c, r.offset_a, r.offset_b, r.offset_c, r.gain_a, r.gain_b, r.gain_c, r.two_sensors,
@@ -360,10 +382,19 @@ def step_given(state, sample, regs, config, of_speed):
     if c.estimators:
         given = estimation.for_control(state, x, r, cos_theta, sin_theta, cos_out, sin_out)
         flux_mode = r.flux_mode
-    current_limit_state, (i_d_limited, i_q_max) = current_limit.step(state.of_current_limit, x.i_d_ref, r.i_max)
+    by_table = c.references and r.use_table
+    i_d_asked = state.i_d_table if by_table else x.i_d_ref
+    current_limit_state, (i_d_limited, i_q_max) = current_limit.step(state.of_current_limit, i_d_asked, r.i_max)
+    most = state.torque_max if by_table else i_q_max
     speed_pi_state, (i_q_ref, speed_limited) = speed_pi.step(
-        state.of_speed_pi, x.omega_ref, omega_me, x.i_q_ext, i_q_max, x.speed_mode, x.run, r.speed_kp, r.speed_ki
+        state.of_speed_pi, x.omega_ref, omega_me, x.i_q_ext, most, x.speed_mode, x.run, r.speed_kp, r.speed_ki
     )
+    torque_ref, table_current_state = i_q_ref, state.of_current_reference
+    if c.references:
+        table_current_state, (i_q_circle,) = current_reference.step(
+            state.of_current_reference, state.i_q_table, i_q_max, r.use_table
+        )
+        i_q_ref = i_q_circle if by_table else i_q_ref
     current_pi_state, (u_pi_d, u_pi_q, u_int_d, u_int_q) = current_pi.step(
         state.of_current_pi, i_d, i_q, i_d_limited, i_q_ref, state.sat_d, state.sat_q, x.run, r.kp_d, r.ki_d, r.kp_q,
         r.ki_q,
@@ -397,6 +428,15 @@ def step_given(state, sample, regs, config, of_speed):
             u_q=u_q, sat_d=sat_d, sat_q=sat_q,
         )  # fmt: skip
         after, e = estimation.step(state, given, seen, x, r, c.carrier_half)
+
+    references_state, (i_d_table, i_q_table, torque_max) = state.of_torque_reference, (0, 0, 0)
+    if c.references:
+        asked = torque_reference.Inputs(
+            torque_ref=torque_ref, omega_me=omega_me, u_max=u_max, run=x.run, u_d=u_d, u_q=u_q, torque=e.torque
+        )
+        references_state, (i_d_table, i_q_table, torque_max) = torque_reference.step_table(
+            state.of_torque_reference, asked, r, table
+        )
 
     checks_state, (sample_faults, sample_trip) = sample_checks.step(
         state.of_sample_checks,
@@ -445,7 +485,8 @@ def step_given(state, sample, regs, config, of_speed):
         compare_c=compare_c, lambda_m_alpha=after.lambda_m_alpha, lambda_m_beta=after.lambda_m_beta,
         merge_known=after.merge_known, lambda_pi_d=after.lambda_pi_d, lambda_pi_q=after.lambda_pi_q,
         lambda_add_d=after.lambda_add_d, lambda_add_q=after.lambda_add_q, v_comp=after.v_comp, v_leg=after.v_leg,
-        s_alpha=after.s_alpha, s_beta=after.s_beta,
+        s_alpha=after.s_alpha, s_beta=after.s_beta, of_current_reference=table_current_state,
+        of_torque_reference=references_state, i_d_table=i_d_table, i_q_table=i_q_table, torque_max=torque_max,
     )  # fmt: skip
     return following, Observed(
         i_a=i_a, i_b=i_b, i_c=i_c, current_at_rail=current_at_rail, u_dc=u_dc, u_max=u_max, u_dc_at_rail=u_dc_at_rail,

@@ -8,10 +8,14 @@ Dead time and minimum pulse are rounded up, because they must not be shorter tha
 import math
 from typing import NamedTuple
 
+import numpy as np
+
+from golden_model.control.torque_reference import BLANK
 from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError
 from golden_model.fluxproof import REGISTERS, Config, Registers
 from golden_model.scaling import PARTS, ROUND_UP, gates
+from golden_model.table_scaling import references, table_of
 from golden_model.units import TURN_RAD
 
 
@@ -35,16 +39,23 @@ class RegisterSet(NamedTuple):
     values: Registers
     config: Config
     rows: tuple[Row, ...]
+    table: np.ndarray = BLANK  # words of the torque table, see torque_reference
 
 
-def registers(drive: Drive) -> RegisterSet:
-    """All registers of a drive; DriveError names the keys behind a value that is out of range."""
-    entries = {e.name: e for part in PARTS for e in part(drive)}
+def registers(drive: Drive, flux=None) -> RegisterSet:
+    """All registers of a drive; DriveError names the keys behind a value that is out of range.
+
+    ``flux``: the measured flux linkage of the machine for the torque table, see torque_table.measured.
+    """
+    table = table_of(drive, flux) if drive.core.references else None
+    entries = {e.name: e for part in PARTS for e in part(drive)} | {e.name: e for e in references(drive, table)}
     rows = {name: _row(entries[name], port) for name, port in REGISTERS.items()}
     _keep_pulse_above_dead_time(rows, drive)
-    config = Config(drive.sensors.adc_bits, drive.sensors.position_bits, drive.carrier_half, int(drive.core.estimators))
+    generics = (drive.carrier_half, int(drive.core.estimators), int(drive.core.references))
+    config = Config(drive.sensors.adc_bits, drive.sensors.position_bits, *generics)
     values = Registers(*(rows[name].integer for name in REGISTERS))
-    return RegisterSet(values, config, tuple(rows.values()))
+    words = BLANK if table is None else table.words(drive.bases, drive.torque_base_nm)
+    return RegisterSet(values, config, tuple(rows.values()), words)
 
 
 def _row(entry, port):

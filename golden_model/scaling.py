@@ -80,9 +80,12 @@ def speed_loop(drive):
     keys = "[machine] inertia_kgm2, magnet_flux_wb, pole_pairs; [control] speed_bandwidth_hz"
     kp_keys = keys if c.speed_kp_as_per_rad is None else "[control] speed_kp_as_per_rad"
     ki_keys = keys if c.speed_ki_a_per_rad is None else "[control] speed_ki_a_per_rad"
-    per_speed = b.current_a / b.omega_me_rad_s
-    yield Entry("speed_kp", kp, "A s/rad", per_speed, f"{kp_keys}; {base}")
-    yield Entry("speed_ki", ki, "A/rad", per_speed / t_s, f"{ki_keys}; {base}")
+    per_speed, what = b.current_a / b.omega_me_rad_s, "A"
+    if drive.core.references:  # the regulator's output is a torque then
+        per_ampere = 1.5 * m.pole_pairs * m.magnet_flux_wb
+        kp, ki, per_speed, what = kp * per_ampere, ki * per_ampere, drive.torque_base_nm / b.omega_me_rad_s, "Nm"
+    yield Entry("speed_kp", kp, f"{what} s/rad", per_speed, f"{kp_keys}; {base}")
+    yield Entry("speed_ki", ki, f"{what}/rad", per_speed / t_s, f"{ki_keys}; {base}")
     limit = "[machine] rated_current_a" if c.current_limit_a is None else "[control] current_limit_a"
     yield Entry("i_max", drive.current_limit_a, "A", b.current_a, f"{limit}; {base_keys(drive, 'current_a')}")
 
@@ -209,6 +212,11 @@ def vsi_estimators(drive):
         "[inverter] dead_time_s, pwm_frequency_hz, dc_bus_v" if c.v_dead_limit_v is None else "[control] v_dead_limit_v"
     )
     yield Entry("v_comp_max", most, "V", b.voltage_v, f"{keys}; {volts}")
+    start, keys = c.v_dead_start_v, "[control] v_dead_start_v"
+    if start is None:  # from the data where torques are asked, which needs the flux from the first second
+        start = leg_loss_v(drive) if drive.core.references and c.dead_time_compensation else 0.0
+        keys = "[core] references; [inverter] dead_time_s, pwm_frequency_hz, dc_bus_v"
+    yield Entry("v_start", min(start, most), "V", b.voltage_v, f"{keys}; {volts}")
     least, keys = LEARN_OF_RATED * m.rated_current_a, "[machine] rated_current_a"
     yield Entry("i_learn", least, "A", b.current_a, f"{keys}; {amperes}")
     yield Entry("compensate", int(c.dead_time_compensation), "1", 1.0, "[control] dead_time_compensation")

@@ -8,6 +8,8 @@
 -- An instance's lines: strobes; inputs; settings; outputs.  o: observed signals; e: estimates.
 -- ESTIMATORS = 0 leaves out the flux estimator and both Adalines: the decoupling then uses the current model alone, as
 -- with flux_mode 0, dead time is not compensated, and what they would show is zero.
+-- REFERENCES = 1 builds the torque table: with use_table the speed regulator's output is a torque, i_q_ext too, and the
+-- table gives both current references at the flux limit of speed and bus voltage, see control/torque_reference.vhd.
 -- Formats: per unit, see golden_model/formats.py; settings as `fluxproof registers drive.toml` prints them.
 -- Latency: sample_valid to duty_valid FLUXPROOF_SAMPLE_TO_DUTY clocks; samples FLUXPROOF_SAMPLE_INTERVAL or more apart.
 -- Settings change only between samples, at the latest at the edge at which a sample enters (a setting then applies to
@@ -26,7 +28,8 @@ entity fluxproof is
     ADC_BITS      : positive range 12 to 16   := 16;
     POSITION_BITS : positive range 8 to 18    := 16;
     CARRIER_HALF  : positive range 8 to 32767 := 10000;  -- half a PWM period in clocks
-    ESTIMATORS    : natural range 0 to 1      := 1  -- 0: field-oriented control alone
+    ESTIMATORS    : natural range 0 to 1      := 1;  -- 0: field-oriented control alone
+    REFERENCES    : natural range 0 to 1      := 0  -- 1: current references by a table of torque and flux limit
   );
   port (
     clk             : in  std_logic;
@@ -71,7 +74,7 @@ architecture rtl of fluxproof is
   -- Strobes
   signal sample_entered, latch_valid, current_soon    : std_logic;
   signal current_valid, theta_valid, omega_valid      : std_logic;
-  signal dc_valid, reference_valid                    : std_logic;
+  signal dc_valid, circle_valid, reference_valid      : std_logic;
   signal dc_soon, alpha_beta_soon, dq_soon            : std_logic;
   signal trig_soon, trig_valid                        : std_logic;
   signal models_valid, lambda_valid, decoupling_valid : std_logic;
@@ -87,6 +90,9 @@ architecture rtl of fluxproof is
   signal model_d, model_q                       : signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
   signal merged_d, merged_q                     : signed(FLUX_MODELS_MERGED_FLUX_W - 1 downto 0);
   signal merged, ended, estimate_limited        : std_logic;
+
+  -- From the torque table to the control
+  signal i_d_asked, torque_limit, torque_ref : signed(PU_W - 1 downto 0);
 
   -- From the estimators to the control
   signal flux_mode              : unsigned(1 downto 0);
@@ -184,16 +190,43 @@ begin
 
   current_circle : entity work.current_limit
     port map (clk => clk, rst => rst, in_valid => latch_valid,
-              i_d_ref => i_d_ref,
+              i_d_ref => i_d_asked,
               i_max => settings.i_max,
-              out_valid => open, i_d_limited => i_d_limited, i_q_max => i_q_max);
+              out_valid => circle_valid, i_d_limited => i_d_limited, i_q_max => i_q_max);
 
   speed_regulator : entity work.speed_pi
     port map (clk => clk, rst => rst, in_valid => omega_valid,
-              omega_ref => omega_ref, omega_me => o.omega_me, i_q_ext => i_q_ext, i_q_max => i_q_max,
+              omega_ref => omega_ref, omega_me => o.omega_me, i_q_ext => i_q_ext, i_q_max => torque_limit,
               speed_mode => speed_mode, run => run,
               speed_kp => settings.speed_kp, speed_ki => settings.speed_ki,
-              out_valid => reference_valid, i_q_ref => o.i_q_ref, speed_limited => o.speed_limited);
+              out_valid => reference_valid, i_q_ref => torque_ref, speed_limited => o.speed_limited);
+
+  by_table : if REFERENCES = 1 generate
+    signal i_d_table, i_q_table, i_q_circle, torque_max : signed(PU_W - 1 downto 0);
+  begin
+    references : entity work.torque_reference
+      port map (clk => clk, rst => rst, in_valid => reference_valid,
+                torque_ref => torque_ref, omega_me => o.omega_me, u_max => o.u_max, run => run, u_d => o.u_d,
+                u_q => o.u_q, torque => e.torque,
+                k_flux => settings.k_flux, u_share => settings.u_share, k_voltage => settings.k_voltage,
+                share_min => settings.share_min, k_torque => settings.k_torque, omega_learn => settings.omega_learn,
+                torque_step => settings.torque_step, table_word => settings.table_word,
+                out_valid => open, i_d_table => i_d_table, i_q_table => i_q_table, torque_max => torque_max);
+
+    table_current : entity work.current_reference
+      port map (clk => clk, rst => rst, in_valid => circle_valid,
+                i_q_table => i_q_table, i_q_max => i_q_max,
+                use_table => settings.use_table,
+                out_valid => open, i_q_circle => i_q_circle);
+
+    i_d_asked    <= i_d_table when settings.use_table = '1' else i_d_ref;
+    torque_limit <= torque_max when settings.use_table = '1' else i_q_max;
+    o.i_q_ref    <= i_q_circle when settings.use_table = '1' else torque_ref;
+  else generate
+    i_d_asked    <= i_d_ref;
+    torque_limit <= i_q_max;
+    o.i_q_ref    <= torque_ref;
+  end generate by_table;
 
   current_regulators : entity work.current_pi
     port map (clk => clk, rst => rst, in_valid => dq_soon,
@@ -387,7 +420,7 @@ begin
                 current_at_rail => o.current_at_rail, voltage_known => voltage_known, run => run,
                 k_lp => settings.k_lp, eta_v => settings.eta_v, gamma => settings.gamma, zeta => settings.zeta,
                 v_thr => settings.v_thr, v_comp_max => settings.v_comp_max, i_learn => settings.i_learn,
-                compensate => settings.compensate,
+                compensate => settings.compensate, v_start => settings.v_start,
                 out_valid => open, v_dead => e.v_dead, v_comp => e.v_comp, v_leg => v_leg,
                 v_comp_limited => e.v_comp_limited);
 

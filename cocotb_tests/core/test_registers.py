@@ -38,7 +38,7 @@ def test_every_register_is_in_range_and_within_half_an_lsb(path):
 def test_registers_of_the_papers_drive():
     """Calculated by hand from Table 2 and the bases 12.5 A, 500 V, 1256 rad/s."""
     drive = load(PAPER)
-    values, config, _ = registers(drive)
+    values, config, *_ = registers(drive)
     assert (config.adc_bits, config.position_bits, config.carrier_half) == (16, 16, 10000)
     assert drive.bases.flux_wb == pytest.approx(500 / 1256)
     assert values.offset_a == values.offset_b == values.offset_c == 32768

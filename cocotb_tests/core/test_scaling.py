@@ -20,7 +20,7 @@ from golden_model.units import from_si, si_per_lsb, to_si
 @each_drive
 def test_sensor_codes_convert_to_amperes_and_volts(path):
     drive = load(path)
-    v, config, _ = registers(drive)
+    v, config, *_ = registers(drive)
     s, full = drive.sensors, 2**drive.sensors.adc_bits
     code = full // 2 + full // 5
     amperes = (code - full / 2) / (full / 2) * s.current_range_a
@@ -89,7 +89,7 @@ def test_flux_and_rotational_voltage(path):
 def test_position_steps_give_speed_and_angle_advance(path):
     """One code a sample, a settled filter; then the angle that this speed turns during the delay."""
     drive = load(path)
-    v, config, _ = registers(drive)
+    v, config, *_ = registers(drive)
     state, code = speed.State(), 0
     for code in range(0, 3000, 10):
         state, (omega_me, *_) = speed.step(state, code, v.reverse, v.k_speed, v.k_filter, 0, 0, 0, config.position_bits)

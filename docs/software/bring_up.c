@@ -147,6 +147,9 @@ static void check_generics(void)
         {"CARRIER_HALF", AT(carrier_half), FLUXPROOF_CARRIER_HALF},
         {"CLOCK_HZ", AT(clock_hz), FLUXPROOF_CLOCK_HZ},
         {"ESTIMATORS", AT(estimators), FLUXPROOF_ESTIMATORS},
+#ifdef FLUXPROOF_TORQUE_TABLE
+        {"REFERENCES", AT(references), 1},
+#endif
 #ifdef FLUXPROOF_ENCODER /* the drive file has front ends: the core must be a fluxproof_board with them */
         {"ENCODER", AT(encoder), FLUXPROOF_ENCODER},
         {"CURRENTS", AT(currents), FLUXPROOF_CURRENTS},
@@ -168,6 +171,10 @@ static void load_drive(bool speed_mode)
     put(AT(i_d_ref), 0);
     put(AT(i_q_ext), 0);
     put(AT(speed_mode), speed_mode);
+#ifdef FLUXPROOF_TORQUE_TABLE /* [core] references = true: i_q_ext is a torque per FLUXPROOF_BASE_TORQUE_NM */
+    for (size_t k = 0; k < COUNT(fluxproof_torque_table); k++)
+        put(AT(table_word), fluxproof_torque_table[k]);
+#endif
     for (size_t k = 0; k < COUNT(fluxproof_settings); k++)
         put(fluxproof_settings[k].offset, (uint32_t)fluxproof_settings[k].value);
     for (size_t k = 0; k < COUNT(fluxproof_settings); k++) {

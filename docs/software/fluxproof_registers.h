@@ -48,6 +48,11 @@ extern "C" {
 #define FLUXPROOF__ESTIMATORS__VALUE_bp 0
 #define FLUXPROOF__ESTIMATORS__VALUE_bw 32
 
+// reg - fluxproof::references
+#define FLUXPROOF__REFERENCES__VALUE_bm 0xffffffff
+#define FLUXPROOF__REFERENCES__VALUE_bp 0
+#define FLUXPROOF__REFERENCES__VALUE_bw 32
+
 // reg - fluxproof::enable
 #define FLUXPROOF__ENABLE__VALUE_bm 0x1
 #define FLUXPROOF__ENABLE__VALUE_bp 0
@@ -786,6 +791,66 @@ extern "C" {
 #define FLUXPROOF__DOUBLE_UPDATE__VALUE_bw 1
 #define FLUXPROOF__DOUBLE_UPDATE__VALUE_reset 0x0
 
+// reg - fluxproof::use_table
+#define FLUXPROOF__USE_TABLE__VALUE_bm 0x1
+#define FLUXPROOF__USE_TABLE__VALUE_bp 0
+#define FLUXPROOF__USE_TABLE__VALUE_bw 1
+#define FLUXPROOF__USE_TABLE__VALUE_reset 0x0
+
+// reg - fluxproof::k_flux
+#define FLUXPROOF__K_FLUX__VALUE_bm 0xffffff
+#define FLUXPROOF__K_FLUX__VALUE_bp 0
+#define FLUXPROOF__K_FLUX__VALUE_bw 24
+#define FLUXPROOF__K_FLUX__VALUE_reset 0x0
+
+// reg - fluxproof::u_share
+#define FLUXPROOF__U_SHARE__VALUE_bm 0xffff
+#define FLUXPROOF__U_SHARE__VALUE_bp 0
+#define FLUXPROOF__U_SHARE__VALUE_bw 16
+#define FLUXPROOF__U_SHARE__VALUE_reset 0x0
+
+// reg - fluxproof::k_voltage
+#define FLUXPROOF__K_VOLTAGE__VALUE_bm 0xffffff
+#define FLUXPROOF__K_VOLTAGE__VALUE_bp 0
+#define FLUXPROOF__K_VOLTAGE__VALUE_bw 24
+#define FLUXPROOF__K_VOLTAGE__VALUE_reset 0x0
+
+// reg - fluxproof::share_min
+#define FLUXPROOF__SHARE_MIN__VALUE_bm 0xffff
+#define FLUXPROOF__SHARE_MIN__VALUE_bp 0
+#define FLUXPROOF__SHARE_MIN__VALUE_bw 16
+#define FLUXPROOF__SHARE_MIN__VALUE_reset 0x0
+
+// reg - fluxproof::k_torque
+#define FLUXPROOF__K_TORQUE__VALUE_bm 0xffffff
+#define FLUXPROOF__K_TORQUE__VALUE_bp 0
+#define FLUXPROOF__K_TORQUE__VALUE_bw 24
+#define FLUXPROOF__K_TORQUE__VALUE_reset 0x0
+
+// reg - fluxproof::omega_learn
+#define FLUXPROOF__OMEGA_LEARN__VALUE_bm 0xffffffff
+#define FLUXPROOF__OMEGA_LEARN__VALUE_bp 0
+#define FLUXPROOF__OMEGA_LEARN__VALUE_bw 32
+#define FLUXPROOF__OMEGA_LEARN__VALUE_reset 0x0
+
+// reg - fluxproof::table_word
+#define FLUXPROOF__TABLE_WORD__VALUE_bm 0x7fffffff
+#define FLUXPROOF__TABLE_WORD__VALUE_bp 0
+#define FLUXPROOF__TABLE_WORD__VALUE_bw 31
+#define FLUXPROOF__TABLE_WORD__VALUE_reset 0x0
+
+// reg - fluxproof::v_start
+#define FLUXPROOF__V_START__VALUE_bm 0x1ffff
+#define FLUXPROOF__V_START__VALUE_bp 0
+#define FLUXPROOF__V_START__VALUE_bw 17
+#define FLUXPROOF__V_START__VALUE_reset 0x0
+
+// reg - fluxproof::torque_step
+#define FLUXPROOF__TORQUE_STEP__VALUE_bm 0xffffffff
+#define FLUXPROOF__TORQUE_STEP__VALUE_bp 0
+#define FLUXPROOF__TORQUE_STEP__VALUE_bw 32
+#define FLUXPROOF__TORQUE_STEP__VALUE_reset 0x0
+
 // reg - fluxproof::encoder
 #define FLUXPROOF__ENCODER__VALUE_bm 0xffffffff
 #define FLUXPROOF__ENCODER__VALUE_bp 0
@@ -1270,7 +1335,8 @@ typedef struct {
     uint32_t carrier_half;
     uint32_t clock_hz;
     uint32_t estimators;
-    uint8_t RESERVED_1c_3f[0x24];
+    uint32_t references;
+    uint8_t RESERVED_20_3f[0x20];
     uint32_t enable;
     uint32_t clear_trip;
     uint32_t clear_faults;
@@ -1397,7 +1463,18 @@ typedef struct {
     uint32_t emf_l;
     uint8_t RESERVED_23c_23f[0x4];
     uint32_t double_update;
-    uint8_t RESERVED_244_3ff[0x1bc];
+    uint8_t RESERVED_244_24f[0xc];
+    uint32_t use_table;
+    uint32_t k_flux;
+    uint32_t u_share;
+    uint32_t k_voltage;
+    uint32_t share_min;
+    uint32_t k_torque;
+    uint32_t omega_learn;
+    uint32_t table_word;
+    uint32_t v_start;
+    uint32_t torque_step;
+    uint8_t RESERVED_278_3ff[0x188];
     uint32_t encoder;
     uint32_t currents;
     uint32_t spi_lines;

@@ -8,7 +8,7 @@ edge is compared with ``==``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -24,6 +24,7 @@ from fluxproof.plant import (
     half_gates,
 )
 from golden_model import fluxproof
+from golden_model.torque_table import table_words
 
 SAMPLE_DELAY = 4  # clocks from sample_trigger to sample_valid: the conversion time of an ADC, shortened
 
@@ -44,8 +45,8 @@ class Period:
 class Device(Protocol):
     """Runs one period: takes the sample SAMPLE_DELAY clocks after sample_trigger."""
 
-    async def start(self, registers, enable: int) -> Period:
-        """Reset, set the registers, run to the first sample_trigger."""
+    async def start(self, registers, enable: int, words: Sequence[int] = ()) -> Period:
+        """Load the torque table with these values of table_word, reset, set the registers, run to a sample_trigger."""
         ...
 
     async def period(self, inputs: dict[str, int], enable: int) -> Period:
@@ -69,7 +70,7 @@ class GoldenPeriods:
     """The golden core as a period machine; an edge on the last clock belongs to the next period."""
 
     def __init__(self, register_set):
-        self.core = GoldenClock(register_set.values, register_set.config)
+        self.core = GoldenClock(register_set.values, register_set.config, register_set.table)
         self.word, self.carried = 0, None
 
     def run(self, inputs: dict[str, int] | None, enable: int) -> Period:
@@ -119,6 +120,7 @@ class Comparison:
     def __init__(self, device: Device, register_set):
         self.device, self.config = device, register_set.config
         self.golden, self.result = GoldenPeriods(register_set), Result()
+        self.words = table_words(register_set.table) if self.config.references else []
         self.samples: list[tuple[int | str, ...]] = []
         self.observed: list[fluxproof.Observed] = []
         self.edges: list[tuple[int, int, int]] = []
@@ -135,7 +137,7 @@ class Comparison:
 
     async def start(self, enable: int) -> None:
         """Reset and run to the first sample_trigger."""
-        got = await self.device.start(self.golden.core.registers, enable)
+        got = await self.device.start(self.golden.core.registers, enable, self.words)
         if not np.array_equal(got.gate_words, self.golden.run(None, enable).gate_words):
             self.differ("gates before the first sample")
 

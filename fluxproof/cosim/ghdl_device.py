@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import gc
+from collections.abc import Sequence
 
 import cocotb
 import numpy as np
@@ -24,13 +25,19 @@ def now() -> int:
     return int(get_sim_time("ns")) // CLOCK_NS
 
 
-async def prepare(dut, registers, enable: int = 0) -> None:
-    """Registers set, all other inputs zero, clock started, four clocks of reset; ends at a falling edge."""
+async def prepare(dut, registers, enable: int = 0, words: Sequence[int] = ()) -> None:
+    """Registers set, all other inputs zero, clock started, four clocks of reset; ends at a falling edge.
+
+    ``words``: values of table_word that load the torque table before, one a clock.
+    """
     inputs = {p.name: 0 for p in sample_latch.BLOCK.inputs if p.name != "run_in"}
     inputs |= {"sample_valid": 0, "trip": 0, "clear_trip": 0, "host_write": 0, "enable": enable, "rst": 1}
     for name, value in {**registers._asdict(), **inputs}.items():
         getattr(dut, name).value = int(value)
     Clock(dut.clk, CLOCK_NS, unit="ns").start()
+    for word in words:
+        dut.table_word.value = word
+        await FallingEdge(dut.clk)
     for _ in range(4):
         await FallingEdge(dut.clk)
     dut.rst.value = 0
@@ -58,8 +65,8 @@ class GhdlDevice:
                 self.word = word
                 self.edges.append((clock, word))
 
-    async def start(self, registers, enable: int) -> Period:
-        await prepare(self.dut, registers, enable)
+    async def start(self, registers, enable: int, words: Sequence[int] = ()) -> Period:
+        await prepare(self.dut, registers, enable, words)
         for gates in (self.dut.gate_high, self.dut.gate_low):
             cocotb.start_soon(self._watch_gates(gates))
         gc.freeze()  # what is imported stays: the collector need not search it again and again

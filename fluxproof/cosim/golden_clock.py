@@ -12,6 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from golden_model import clocked, fluxproof
+from golden_model.control.torque_reference import BLANK
 from golden_model.kernel import kernel
 
 SEEN = clocked.Seen._fields
@@ -31,10 +32,10 @@ def run_clocks(state, inputs, regs, carrier_half, until_trigger, seen):
 
 
 class GoldenClock:
-    """One golden core after its reset; ``registers`` may be replaced at any clock."""
+    """One golden core after its reset; ``registers`` may be replaced at any clock.  ``table``: as RegisterSet."""
 
-    def __init__(self, registers: fluxproof.Registers, config: fluxproof.Config):
-        self.registers, self.config = registers, config
+    def __init__(self, registers: fluxproof.Registers, config: fluxproof.Config, table: np.ndarray = BLANK):
+        self.registers, self.config, self.table = registers, config, table
         self.state, self.of_samples = clocked.State(), fluxproof.State()
         self.inputs = clocked.Inputs()
         self.clock = 0
@@ -86,7 +87,10 @@ class GoldenClock:
         # they are on.
         gates = self.state.of_gate_generation
         registers = self.registers._replace(min_pulse=gates.min_pulse, double_update=gates.double_update)
-        self.of_samples, observed = fluxproof.step(self.of_samples, self.samples[-1], registers, self.config)
+        given = fluxproof.given_by_registers(registers)
+        self.of_samples, observed = fluxproof.step_table(
+            self.of_samples, self.samples[-1], registers, self.config, given, self.table
+        )
         self.observed = observed
         for after, names in clocked.DUE.values():
             self._due.append((self.clock + after, {name: getattr(observed, name) for name in names}))

@@ -64,6 +64,7 @@ class Bench(NamedTuple):
     bus: Bus
     u_dc: np.ndarray  # (1,) V, of the bus
     edges: Edges  # of Hall sensors; of other encoders the position is a code
+    table: np.ndarray  # words of the torque table, as RegisterSet
 
 
 @kernel
@@ -176,7 +177,7 @@ def run_switching(state, stimulus, bench, first, out, observed):
         duties[0] = state.compare_a / b.config.carrier_half
         duties[1] = state.compare_b / b.config.carrier_half
         duties[2] = state.compare_c / b.config.carrier_half
-        state, seen = fluxproof.step_given(state, sample, b.registers, b.config, of_speed)
+        state, seen = fluxproof.step_table(state, sample, b.registers, b.config, of_speed, b.table)
         for n, value in enumerate(seen):
             observed[k, n] = value
         if b.registers.double_update:
@@ -240,6 +241,7 @@ def simulate(
         bus=bus,
         u_dc=np.array([float(scenario.u_dc[0])]),
         edges=edges or no_edges(),
+        table=register_set.table,
     )
     shown = set() if progress is None else set(range(0, n, PROGRESS_PERIODS))
     ends = [*sorted((set(scenario.changes) | shown) - {0}), n]

@@ -6,6 +6,8 @@ Fast enough for the full ratio of 200 MHz to 10 kHz: 20,000 clocks a period.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fluxproof.cosim.closed_loop import FLAGS, SAMPLE_DELAY, Period
@@ -21,7 +23,10 @@ class VerilatedDevice:
         self.limit = 4 * config.carrier_half
         self.carried: list[tuple[int, int]] = []
 
-    async def start(self, registers, enable: int) -> Period:
+    async def start(self, registers, enable: int, words: Sequence[int] = ()) -> Period:
+        for word in words:  # of the torque table, which a reset does not change
+            self.core.set("table_word", word)
+            self.core.tick()
         self.core.reset()
         self.core.set_many({**registers._asdict(), "enable": enable})
         return self._finish(*self.core.run_period(self.limit), None, 0, 0)

@@ -7,6 +7,7 @@
     v_dead += eta_v*d_h*e                                          eq. (10), eta_v = 2*9*eta
     v_sum  += zeta*v_dead                   while |v_dead| > v_thr
     v_comp  = limit(gamma*v_dead + v_sum, 0, v_comp_max)           gamma*V_dead of section V.B
+    v_sum is v_start until the gates are on for the first time, and is kept when they are off again
     v_leg   = v_comp + v_dead                                      the whole estimated loss of a leg
 
 Sign and scale: v_dead is the voltage loss of a leg in the direction of its current, positive; the paper's V_dead is
@@ -73,6 +74,7 @@ class State(NamedTuple):
     lp_d: int = 0
     v_dead: int = 0  # V_STATE
     v_sum: int = 0
+    begun: int = 0  # 1: the gates have been on; v_sum is learnt from v_start on
 
 
 @kernel
@@ -103,7 +105,7 @@ def step(state, inputs, regs):
     if learning:
         v_dead = clamp(v_dead + round_half_up(pull * r.eta_v, DROP_ETA), -limit, limit)
     fine = round_half_up(v_dead, DROP_FINE)
-    v_sum = state.v_sum
+    v_sum = state.v_sum if state.begun else r.v_start << TO_LEG
     if not r.compensate:
         v_sum = 0
     elif learning and abs(fine) > (r.v_thr << FINE_TO_LEG):
@@ -113,7 +115,12 @@ def step(state, inputs, regs):
     v_comp = round_half_up(clamp(asked, 0, limit), TO_LEG) if r.compensate else 0
     v_leg = saturate(v_comp + round_half_up(fine, FINE_TO_LEG), V_LEG_W)
     limited = 1 if r.compensate and asked > limit else 0
-    return State(lp_u, lp_d, v_dead, v_sum), (round_half_up(fine, FINE_TO_LEG), v_comp, v_leg, limited)
+    return State(lp_u, lp_d, v_dead, v_sum, 1 if x.run else state.begun), (
+        round_half_up(fine, FINE_TO_LEG),
+        v_comp,
+        v_leg,
+        limited,
+    )
 
 
 def filtered(lp, x, k_lp):
@@ -129,7 +136,8 @@ def reference(v, state):
     limit = v["v_comp_max"]
     _, u_h = filtered(state.lp_u, v["u_pi_d"], v["k_lp"])
     _, d_h = filtered(state.lp_d, v["d_d"], v["k_lp"])
-    v_dead, v_sum = state.v_dead * V_STATE.lsb, state.v_sum * V_STATE.lsb
+    v_dead = state.v_dead * V_STATE.lsb
+    v_sum = state.v_sum * V_STATE.lsb if state.begun else v["v_start"]
     e = FLUX.limit(u_h - v_dead * d_h)
     if learning:
         v_dead = min(max(v_dead + v["eta_v"] * STEP.limit(d_h * e), -limit), limit)
@@ -189,6 +197,10 @@ def stimuli(rng, _config):
                 back = {"u_pi_d": 500, "d_d": 500, name: min(max(other, -high), high)}
                 rows += [{**free, **far, "k_lp": K_LP.hi, "v_comp_max": 0}] * 3
                 rows += [{**free, **back, "k_lp": 1 << k}] + [{**free, "k_lp": 1 << k, "d_d": 90 * k, "u_pi_d": 9}] * 2
+    for k in range(40):  # v_start: before the first run, at it, after it, beyond the limit
+        most = (V_LEVEL.hi, 900, 0, 40)[k % 4]
+        begin = {"v_start": int(rng.integers(1, 1000)), "v_comp_max": most, "run": int(k % 5 > 1)}
+        rows.append({**calm, **gains, **begin, "compensate": int(k % 7 > 0), "d_d": 20000, "u_pi_d": 700})
     for _ in range(80):  # at i_learn and beside it
         i_d, i_q = (int(rng.integers(-size, size)) for size in (1 << rng.integers(1, 18, 2)))
         off = int(rng.choice((0, 0, 1, -1, 1 << rng.integers(14))))
@@ -229,6 +241,7 @@ REGISTERS = (
     Port("v_comp_max", V_LEVEL, doc="largest leg voltage that is compensated"),
     Port("i_learn", Format(0, 1, 16), doc="the V_dead Adaline is held below this |i_d| + |i_q|"),
     Port("compensate", BIT, doc="1: compensate dead time and drops"),
+    Port("v_start", V_LEVEL, doc="leg voltage that is compensated until the Adaline has learnt it"),
 )
 Registers = namedtuple("Registers", [p.name for p in REGISTERS])
 

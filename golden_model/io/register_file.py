@@ -39,7 +39,7 @@ def from_word(word: int) -> int:
 class RegisterFile:
     """The register map with its values; generics and version of the core as built.
 
-    ``generics``: {"adc_bits": ..., "position_bits": ..., "carrier_half": ..., "clock_hz": ..., "estimators": ...}.
+    ``generics``: {name: value} of all of register_map.GENERICS.
     """
 
     def __init__(self, generics: Mapping[str, int], version: int = 0) -> None:

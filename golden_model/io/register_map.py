@@ -35,7 +35,7 @@ PATIENCE = fluxproof.SAMPLE_INTERVAL + 16  # clocks that a write waits for the e
 IDENTIFICATION = int.from_bytes(b"FLUX", "big")
 
 WORD = Format(0, 32, 0)
-GENERICS = ("adc_bits", "position_bits", "carrier_half", "clock_hz", "estimators")
+GENERICS = ("adc_bits", "position_bits", "carrier_half", "clock_hz", "estimators", "references")
 
 
 class Kind(Enum):
@@ -109,7 +109,9 @@ _SETTINGS = """
     214 i_open        218 offset_max     21c heartbeat    220 brake_on     224 brake_off
     228 emf_min       22c emf_i          230 emf_w        234 emf_samples    238 emf_l
     240 double_update
-"""  # 23c and 244 to 3fc are free
+    250 use_table     254 k_flux         258 u_share      25c k_voltage      260 share_min    264 k_torque
+    268 omega_learn   26c table_word     270 v_start        274 torque_step
+"""  # 23c, 244 to 24c and 278 to 3fc are free
 _COMMANDS = {
     "enable": (0x040, Kind.COMMAND),
     "clear_trip": (0x044, Kind.PULSE),
@@ -205,6 +207,7 @@ def _read_only() -> list[Register]:
         word("carrier_half", 0x010, Kind.GENERIC, "half a PWM period in clocks"),
         word("clock_hz", 0x014, Kind.GENERIC, "frequency of the clock, Hz"),
         word("estimators", 0x018, Kind.GENERIC, "1: with estimators, 0: field-oriented control alone"),
+        word("references", 0x01C, Kind.GENERIC, "1: with current references by a table of torque and flux limit"),
         Register("flags", 0x080, Kind.STATUS, flags, "status flags of the core, read together"),
         *(
             Register(name, address, Kind.STATUS, (Field(name, shown[name]),), shown[name].doc)

@@ -2,6 +2,7 @@
 -- Purpose: Adaline of the voltage loss of a leg by dead time and drops, paper 000 eq. (10) and Fig. 4(a).
 --   lp_u += k_lp*(u_pi_d - lp_u), u_h = u_pi_d - lp_u;  lp_d += k_lp*(d_d - lp_d), d_h = d_d - lp_d
 --   e = u_h - v_dead*d_h;  v_dead += eta_v*d_h*e;  v_sum += zeta*v_dead while |v_dead| > v_thr
+--   v_sum is v_start until the gates are on for the first time, and is kept when they are off again
 --   v_comp = limit(gamma*v_dead + v_sum);  v_leg = v_comp + v_dead
 -- v_dead is within +-v_comp_max; v_sum and v_comp from zero to v_comp_max, reported by v_comp_limited.  v_dead and
 -- v_sum are held while the voltage is at its limit, a converter at its end, the voltage not known, the gates off or
@@ -40,6 +41,7 @@ entity v_dead_adaline is
     v_comp_max      : in  unsigned(V_LEG_W - 2 downto 0);
     i_learn         : in  unsigned(PU_W - 2 downto 0);
     compensate      : in  std_logic;
+    v_start         : in  unsigned(V_LEG_W - 2 downto 0);
     out_valid       : out std_logic;
     v_dead          : out signed(V_LEG_W - 1 downto 0);
     v_comp          : out signed(V_LEG_W - 1 downto 0);
@@ -63,6 +65,7 @@ architecture rtl of v_dead_adaline is
     lp_d   : signed(INTEGRAL_W - 1 downto 0);
     v_dead : signed(STATE_W - 1 downto 0);
     v_sum  : signed(STATE_W - 1 downto 0);
+    begun  : std_logic;  -- the gates have been on
   end record state_t;
 
   signal state : state_t;
@@ -91,6 +94,7 @@ architecture rtl of v_dead_adaline is
   signal fine_13   : signed(FINE_W - 1 downto 0);
   signal zeta_14   : signed(zeta'length downto 0);
   signal grown_17  : signed(STATE_W downto 0);
+  signal v_sum_0   : signed(STATE_W - 1 downto 0);
   signal v_sum_18  : signed(STATE_W - 1 downto 0);
   signal asked_21  : signed(ASKED_W - 1 downto 0);
 begin
@@ -124,10 +128,12 @@ begin
     generic map (DROP => V_DEAD_ADALINE_DROP_ETA)
     port map (clk => clk, a => by_eta_v, b => pull_8, c => state.v_dead, y => moved_11, limited => open);
 
+  v_sum_0 <= state.v_sum when state.begun = '1' else shift_left(signed(resize(v_start, STATE_W)), TO_LEG);
+
   -- Stages 15 to 17: grown = v_sum + zeta*fine
   minimisation : entity work.multiply_add
     generic map (DROP => V_DEAD_ADALINE_DROP_ZETA)
-    port map (clk => clk, a => fine_13, b => zeta_14, c => state.v_sum, y => grown_17, limited => open);
+    port map (clk => clk, a => fine_13, b => zeta_14, c => v_sum_0, y => grown_17, limited => open);
 
   -- Stages 19 to 21: asked = v_sum + gamma*fine
   compensation : entity work.multiply_add
@@ -180,7 +186,8 @@ begin
         v_comp         <= v_comp_22;
         v_leg          <= saturate(resize(v_comp_22, V_LEG_W + 1) + v_dead_22, V_LEG_W);
         v_comp_limited <= compensate and beyond(asked_21, v_comp_max, TO_LEG) and not asked_21(ASKED_W - 1);
-        state          <= (lp_u => lp_u_5, lp_d => lp_d_5, v_dead => v_dead_12, v_sum => v_sum_18);
+        state          <= (lp_u => lp_u_5, lp_d => lp_d_5, v_dead => v_dead_12, v_sum => v_sum_18,
+                           begun => state.begun or run);
         if run = '0' then
           state.lp_u <= (others => '0');
           state.lp_d <= (others => '0');
@@ -189,7 +196,7 @@ begin
 
       if rst = '1' then
         valid(1 to LATENCY) <= (others => '0');
-        state               <= (others => (others => '0'));
+        state               <= (begun => '0', others => (others => '0'));
         v_comp              <= (others => '0');
         v_leg               <= (others => '0');
       end if;

@@ -25,6 +25,7 @@ entity board_register_file is
     CARRIER_HALF  : natural := 10000;
     CLOCK_HZ      : natural := 200000000;
     ESTIMATORS    : natural := 1;
+    REFERENCES    : natural := 0;
     ENCODER       : natural := 1;
     CURRENTS      : natural := 1;
     SPI_LINES     : natural := 4
@@ -661,6 +662,46 @@ begin
         settings.double_update <= held(0);
         written(144)           <= '1';
       end if;
+      if (row(18) and column(4) and not sample_busy) = '1' then
+        settings.use_table <= held(0);
+        written(148)       <= '1';
+      end if;
+      if (row(18) and column(5) and not sample_busy) = '1' then
+        settings.k_flux <= unsigned(held(23 downto 0));
+        written(149)    <= '1';
+      end if;
+      if (row(18) and column(6) and not sample_busy) = '1' then
+        settings.u_share <= unsigned(held(15 downto 0));
+        written(150)     <= '1';
+      end if;
+      if (row(18) and column(7) and not sample_busy) = '1' then
+        settings.k_voltage <= unsigned(held(23 downto 0));
+        written(151)       <= '1';
+      end if;
+      if (row(19) and column(0) and not sample_busy) = '1' then
+        settings.share_min <= unsigned(held(15 downto 0));
+        written(152)       <= '1';
+      end if;
+      if (row(19) and column(1) and not sample_busy) = '1' then
+        settings.k_torque <= unsigned(held(23 downto 0));
+        written(153)      <= '1';
+      end if;
+      if (row(19) and column(2) and not sample_busy) = '1' then
+        settings.omega_learn <= signed(held(17 downto 0));
+        written(154)         <= '1';
+      end if;
+      if (row(19) and column(3) and not sample_busy) = '1' then
+        settings.table_word <= unsigned(held(30 downto 0));
+        written(155)        <= '1';
+      end if;
+      if (row(19) and column(4) and not sample_busy) = '1' then
+        settings.v_start <= unsigned(held(16 downto 0));
+        written(156)     <= '1';
+      end if;
+      if (row(19) and column(5) and not sample_busy) = '1' then
+        settings.torque_step <= signed(held(17 downto 0));
+        written(157)         <= '1';
+      end if;
       if (row(32) and column(4)) = '1' then
         clear_encoder <= held(0);
       end if;
@@ -996,6 +1037,16 @@ begin
         settings.emf_samples      <= (others => '0');
         settings.emf_l            <= (others => '0');
         settings.double_update    <= '0';
+        settings.use_table        <= '0';
+        settings.k_flux           <= (others => '0');
+        settings.u_share          <= (others => '0');
+        settings.k_voltage        <= (others => '0');
+        settings.share_min        <= (others => '0');
+        settings.k_torque         <= (others => '0');
+        settings.omega_learn      <= (others => '0');
+        settings.table_word       <= (others => '0');
+        settings.v_start          <= (others => '0');
+        settings.torque_step      <= (others => '0');
         clear_encoder             <= '0';
         take_snapshot             <= '0';
         position_source           <= '0';
@@ -1199,7 +1250,8 @@ begin
   shown(4)          <= std_logic_vector(to_unsigned(CARRIER_HALF, 32));
   shown(5)          <= std_logic_vector(to_unsigned(CLOCK_HZ, 32));
   shown(6)          <= std_logic_vector(to_unsigned(ESTIMATORS, 32));
-  shown(7 to 16)    <= (others => (others => '0'));
+  shown(7)          <= std_logic_vector(to_unsigned(REFERENCES, 32));
+  shown(8 to 16)    <= (others => (others => '0'));
   shown(17)         <= "0000000000000000000000000000000" & clear_trip;
   shown(18)         <= "0000000000000000000000000000000" & clear_faults_in;
   shown(19 to 26)   <= (others => (others => '0'));

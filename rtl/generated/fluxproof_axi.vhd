@@ -25,6 +25,7 @@ entity fluxproof_axi is
     POSITION_BITS : integer range 8 to 18        := 16;  -- width of the position code
     CARRIER_HALF  : integer range 8 to 32767     := 10000;  -- half a PWM period in clocks
     ESTIMATORS    : integer range 0 to 1         := 1;  -- 0 leaves the estimators out
+    REFERENCES    : integer range 0 to 1         := 0;  -- 1 builds the torque table
     GATE_ACTIVE   : integer range 0 to 1         := 1;  -- level of gate_high and gate_low at which a switch is on
     TRIP_ACTIVE   : integer range 0 to 1         := 1;  -- level of trip that turns the gates off
     BRAKE_ACTIVE  : integer range 0 to 1         := 1  -- level of brake at which the resistor is on
@@ -136,7 +137,8 @@ begin
       POSITION_BITS => POSITION_BITS,
       CARRIER_HALF  => CARRIER_HALF,
       CLOCK_HZ      => CLOCK_HZ,
-      ESTIMATORS    => ESTIMATORS
+      ESTIMATORS    => ESTIMATORS,
+      REFERENCES    => REFERENCES
     )
     port map (
       clk               => aclk,
@@ -192,7 +194,8 @@ begin
       ADC_BITS      => ADC_BITS,
       POSITION_BITS => POSITION_BITS,
       CARRIER_HALF  => CARRIER_HALF,
-      ESTIMATORS    => ESTIMATORS
+      ESTIMATORS    => ESTIMATORS,
+      REFERENCES    => REFERENCES
     )
     port map (
       clk             => aclk,

@@ -24,7 +24,8 @@ entity register_file is
     POSITION_BITS : natural := 16;
     CARRIER_HALF  : natural := 10000;
     CLOCK_HZ      : natural := 200000000;
-    ESTIMATORS    : natural := 1
+    ESTIMATORS    : natural := 1;
+    REFERENCES    : natural := 0
   );
   port (
     clk               : in  std_logic;
@@ -78,7 +79,7 @@ end entity register_file;
 
 architecture rtl of register_file is
   constant WORD_W  : positive := 8;  -- registers are in the first 2**WORD_W words
-  constant LIMIT_W : positive := 25;  -- every register's range fits so many bits
+  constant LIMIT_W : positive := 32;  -- every register's range fits so many bits
 
   type words_t is array (0 to 2**WORD_W - 1) of std_logic_vector(31 downto 0);
   type fours_t is array (0 to 2**(WORD_W - 2) - 1) of std_logic_vector(31 downto 0);
@@ -576,6 +577,46 @@ begin
         settings.double_update <= held(0);
         written(144)           <= '1';
       end if;
+      if (row(18) and column(4) and not sample_busy) = '1' then
+        settings.use_table <= held(0);
+        written(148)       <= '1';
+      end if;
+      if (row(18) and column(5) and not sample_busy) = '1' then
+        settings.k_flux <= unsigned(held(23 downto 0));
+        written(149)    <= '1';
+      end if;
+      if (row(18) and column(6) and not sample_busy) = '1' then
+        settings.u_share <= unsigned(held(15 downto 0));
+        written(150)     <= '1';
+      end if;
+      if (row(18) and column(7) and not sample_busy) = '1' then
+        settings.k_voltage <= unsigned(held(23 downto 0));
+        written(151)       <= '1';
+      end if;
+      if (row(19) and column(0) and not sample_busy) = '1' then
+        settings.share_min <= unsigned(held(15 downto 0));
+        written(152)       <= '1';
+      end if;
+      if (row(19) and column(1) and not sample_busy) = '1' then
+        settings.k_torque <= unsigned(held(23 downto 0));
+        written(153)      <= '1';
+      end if;
+      if (row(19) and column(2) and not sample_busy) = '1' then
+        settings.omega_learn <= signed(held(17 downto 0));
+        written(154)         <= '1';
+      end if;
+      if (row(19) and column(3) and not sample_busy) = '1' then
+        settings.table_word <= unsigned(held(30 downto 0));
+        written(155)        <= '1';
+      end if;
+      if (row(19) and column(4) and not sample_busy) = '1' then
+        settings.v_start <= unsigned(held(16 downto 0));
+        written(156)     <= '1';
+      end if;
+      if (row(19) and column(5) and not sample_busy) = '1' then
+        settings.torque_step <= signed(held(17 downto 0));
+        written(157)         <= '1';
+      end if;
 
       if rst = '1' then
         written                   <= (others => '0');
@@ -673,6 +714,16 @@ begin
         settings.emf_samples      <= (others => '0');
         settings.emf_l            <= (others => '0');
         settings.double_update    <= '0';
+        settings.use_table        <= '0';
+        settings.k_flux           <= (others => '0');
+        settings.u_share          <= (others => '0');
+        settings.k_voltage        <= (others => '0');
+        settings.share_min        <= (others => '0');
+        settings.k_torque         <= (others => '0');
+        settings.omega_learn      <= (others => '0');
+        settings.table_word       <= (others => '0');
+        settings.v_start          <= (others => '0');
+        settings.torque_step      <= (others => '0');
       end if;
     end if;
   end process;
@@ -816,7 +867,8 @@ begin
   shown(4)          <= std_logic_vector(to_unsigned(CARRIER_HALF, 32));
   shown(5)          <= std_logic_vector(to_unsigned(CLOCK_HZ, 32));
   shown(6)          <= std_logic_vector(to_unsigned(ESTIMATORS, 32));
-  shown(7 to 16)    <= (others => (others => '0'));
+  shown(7)          <= std_logic_vector(to_unsigned(REFERENCES, 32));
+  shown(8 to 16)    <= (others => (others => '0'));
   shown(17)         <= "0000000000000000000000000000000" & clear_trip;
   shown(18)         <= "0000000000000000000000000000000" & clear_faults_in;
   shown(19 to 26)   <= (others => (others => '0'));

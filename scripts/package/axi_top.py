@@ -46,6 +46,7 @@ GENERICS = {
     "POSITION_BITS": ("integer range 8 to 18", 16, "width of the position code"),
     "CARRIER_HALF": ("integer range 8 to 32767", 10000, "half a PWM period in clocks"),
     "ESTIMATORS": ("integer range 0 to 1", 1, "0 leaves the estimators out"),
+    "REFERENCES": ("integer range 0 to 1", 0, "1 builds the torque table"),
     "GATE_ACTIVE": ("integer range 0 to 1", 1, "level of gate_high and gate_low at which a switch is on"),
     "TRIP_ACTIVE": ("integer range 0 to 1", 1, "level of trip that turns the gates off"),
     "BRAKE_ACTIVE": ("integer range 0 to 1", 1, "level of brake at which the resistor is on"),

@@ -20,6 +20,7 @@ GENERICS = {
     "CARRIER_HALF": 10000,
     "CLOCK_HZ": 200000000,
     "ESTIMATORS": 1,
+    "REFERENCES": 0,
 }  # as in the core
 BOARD_GENERICS = {"ENCODER": 1, "CURRENTS": 1, "SPI_LINES": 4}
 BETWEEN, AT_ONCE = ("setting", "sample pulse"), ("command", "pulse")

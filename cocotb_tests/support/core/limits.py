@@ -29,7 +29,7 @@ class Golden:
         self.flags: list[tuple[int, ...]] = []
         self.running: list[int] = []
 
-    async def start(self, registers, enable):
+    async def start(self, registers, enable, words=()):
         return self._seen(self.periods.run(None, enable))
 
     async def period(self, inputs, enable):

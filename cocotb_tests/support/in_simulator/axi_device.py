@@ -69,7 +69,7 @@ class AxiDevice:
                 self.word = word
                 self.edges.append((clock, word))
 
-    async def start(self, registers, enable: int) -> Period:
+    async def start(self, registers, enable: int, words=()) -> Period:
         """Reset, load every register over the bus, telemetry on; ends with a sample_trigger."""
         assert not enable, "a watchdog waits for the first sample: enable later"
         await ClockCycles(self.dut.aclk, 8)
@@ -88,6 +88,8 @@ class AxiDevice:
         self.dut.aresetn.value = 1
         cocotb.start_soon(self._watch_gates())
         await ClockCycles(self.dut.aclk, 2)
+        for word in words:
+            await self.write("table_word", word)
         for name, value in registers._asdict().items():
             await self.write(name, value)
         await self._references(0)

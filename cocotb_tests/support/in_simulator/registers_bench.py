@@ -18,7 +18,14 @@ from golden_model.io.register_file import RegisterFile, to_word
 from golden_model.io.register_map import Kind, registers
 from scripts.registers.rdl import version_word
 
-GENERICS = {"adc_bits": 14, "position_bits": 17, "carrier_half": 1234, "clock_hz": 125_000_000, "estimators": 0}
+GENERICS = {
+    "adc_bits": 14,
+    "position_bits": 17,
+    "carrier_half": 1234,
+    "clock_hz": 125_000_000,
+    "estimators": 0,
+    "references": 1,
+}
 MAP = registers()
 WRITABLE = [r for r in MAP.values() if r.kind.writable]
 CHANNELS = {

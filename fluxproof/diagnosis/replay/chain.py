@@ -119,7 +119,8 @@ def run_of(samples, observed: dict, registers: dict, config: dict) -> Run:
     column = np.array([names.index(name) if name in names else -1 for name in FIELDS], np.int64)
     recorded = np.ascontiguousarray(np.stack([observed[name] for name in names], axis=1), np.int64)
     values = fluxproof.Registers(**{name: int(registers[name]) for name in fluxproof.Registers._fields})
-    generics = fluxproof.Config(**{name: int(config[name]) for name in fluxproof.Config._fields})
+    defaults = fluxproof.Config._field_defaults  # a dump of an older core does not know every generic
+    generics = fluxproof.Config(**{name: int(config.get(name, value)) for name, value in defaults.items()})
     given = _given(observed, values)
     return Run(np.array(samples, np.int64, order="C"), recorded, names, column, values, generics, given)
 

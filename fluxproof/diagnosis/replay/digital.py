@@ -56,6 +56,8 @@ def replay(recording: Recording) -> tuple[Digital, list[str]]:
     lacking = [name for name in fluxproof.Registers._fields if name not in meta["registers"]]
     if lacking:
         return Digital(), [f"The digital part was not checked: register {lacking[0]} is not in the recording."]
+    if meta["config"].get("references", 0) and meta["registers"]["use_table"]:
+        return Digital(), ["The digital part was not checked: the recording does not hold the core's torque table."]
     observed = meta.get("observed") or _duties(recording, meta["config"])
     if not observed:
         return Digital(), [

@@ -10,6 +10,7 @@ import types
 from collections import defaultdict
 
 from golden_model import estimation, fluxproof
+from golden_model.control.torque_reference import BLANK
 from golden_model.fluxproof import outputs_of
 
 
@@ -113,8 +114,8 @@ def trace(state, sample, registers, config, of_speed=None) -> dict[str, tuple]:
         setattr(estimators, name, _overheard(getattr(estimation, name).py_func, notes))
     r = registers
     of_speed = of_speed or fluxproof.Given(r.speed_given, r.omega_given, r.position_restart, r.emf_samples)
-    step = _overheard(fluxproof.step_given.py_func, notes, estimation=estimators)
-    step(state, sample, registers, config, of_speed)
+    step = _overheard(fluxproof.step_table.py_func, notes, estimation=estimators)
+    step(state, sample, registers, config, of_speed, BLANK)
     said = {}
     for instance, (module, _) in fluxproof.WIRING.items():
         given = notes[module].pop(0) if notes[module] else ()

@@ -242,7 +242,8 @@ def _state(nested):
         return None
     defaults = fluxproof.State()
     parts = []
-    for value, default in zip(nested, defaults, strict=True):
+    for value, default in zip([*nested, *defaults[len(nested) :]], defaults, strict=True):  # of an older core: shorter
+        value = [*value, *default[len(value) :]] if isinstance(default, tuple) else value
         several = value if isinstance(default, tuple) else [value]
         if not all(type(v) is int and -(2**62) < v < 2**62 for v in several):
             raise ValueError("a state consists of integers")
