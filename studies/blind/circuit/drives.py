@@ -121,11 +121,12 @@ def random_real(rng, names=tuple(KINDS)) -> tuple[str, Real]:
         c_winding=6.0 * heavy, c_iron=60.0 * heavy, c_magnet=20.0 * heavy,
         k_winding=heavy / 60.0, k_magnet=heavy / 200.0, k_ambient=heavy / 60.0, magnet_share=0.1,
     )  # fmt: skip
+    stiff = 333.0 if kind.rectifier else 83.0  # a quarter of a per cent of ripple at the PWM frequency, or less
     inverter = params.Inverter(
         period, float(kind.bus), current,
         dead=0.0004 * period, t_on=0.0002 * period, t_off=0.0003 * period, c_leg=1e-5 * period * current / kind.bus,
         v_switch=rng.uniform(2e-4, 5e-4) * kind.bus, v_diode=rng.uniform(2e-4, 5e-4) * kind.bus,
-        r_on=0.004 * machine.r, c_bus=rng.uniform(0.8, 1.5) * (333.0 if kind.rectifier else 83.0) * current * period / kind.bus,
+        r_on=0.004 * machine.r, c_bus=rng.uniform(0.8, 1.5) * stiff * current * period / kind.bus,
         r_bus=rng.uniform(0.015, 0.04) * kind.bus / current, rectifier=kind.rectifier,
         mains_hz=float(rng.choice((50.0, 60.0))),
     )  # fmt: skip
