@@ -19,6 +19,8 @@ from fluxproof.checkout import BUILD
 from fluxproof.files import write_text
 from fluxproof.fleet.engine import in_parallel
 from studies.blind import cases, identifiable
+from studies.blind.circuit import cases as circuit
+from studies.blind.circuit.write import write_case as write_circuit
 from studies.blind.seal import seal
 from studies.blind.sealed import cases as sealed
 from studies.blind.sealed.write import write_case as write_sealed
@@ -26,7 +28,7 @@ from studies.blind.strangers import cases as strangers
 from studies.blind.strangers.write import write_case
 
 ATTEMPTS = 12
-GENERATORS = ("own", *strangers.GENERATORS, "sealed")
+GENERATORS = ("own", *strangers.GENERATORS, "sealed", "circuit")
 
 
 def listing(seed: int, count: int, only: list[str] | None, generator="own") -> list[tuple[int, str, int]]:
@@ -41,7 +43,7 @@ def listing(seed: int, count: int, only: list[str] | None, generator="own") -> l
 
 def strata_of(generator: str) -> dict[str, float]:
     """Shares of a generator's strata."""
-    return {"own": cases.STRATA, "sealed": sealed.STRATA}.get(generator, strangers.STRATA)
+    return {"own": cases.STRATA, "sealed": sealed.STRATA, "circuit": circuit.STRATA}.get(generator, strangers.STRATA)
 
 
 def write_recording(path: Path, columns: dict, kind: str) -> Path:
@@ -62,6 +64,8 @@ def generate_case(job) -> dict:
     generator, seed, number, stratum, turn, out = job
     if generator == "sealed":
         return write_sealed(job, write_recording)
+    if generator == "circuit":
+        return write_circuit(job, write_recording)
     if generator != "own":
         return write_case(job, write_recording)
     for attempt in range(ATTEMPTS):
