@@ -40,8 +40,11 @@ class Logger:
     ages_s: tuple[float, float, float] = (0.0, 0.003, 0.007)
 
 
-def ride(machine: dict, way: Ride, rng) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(dq current [A], electrical speed [rad/s], dq voltage [V]), every STEP_S, of a machine."""
+def ride(machine: dict, way: Ride, rng, most_v=np.inf, trip_s=np.inf) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(dq current [A], electrical speed [rad/s], dq voltage [V]), every STEP_S, of a machine.
+
+    most_v: voltage that the inverter can give, which limits the current [V]; trip_s: from here on the gates are off.
+    """
     count, pairs = round(way.seconds / STEP_S), machine["pole_pairs"]
     torque = 1.5 * pairs * machine["magnet_flux_wb"]
     knots = rng.uniform(way.low, way.high, int(way.seconds / way.hold_s) + 3) * machine["rated_current_a"]
@@ -50,11 +53,23 @@ def ride(machine: dict, way: Ride, rng) -> tuple[np.ndarray, np.ndarray, np.ndar
     i_q = np.convolve(np.interp(t, np.arange(len(knots)) * way.hold_s, knots), np.ones(width) / width, "same")
     rated, top = torque * machine["rated_current_a"], machine["rated_speed_rad_s"]
     inertia, omega, now = rated * way.reach_s / top, np.zeros(count), 0.0
+    i_q[t >= trip_s] = 0.0
     for n in range(1, count):
+        i_q[n - 1] = np.clip(i_q[n - 1], *_reach(machine, pairs * now, most_v))
         brake = way.load * rated * now / top + DRY * rated * np.tanh(20.0 * now / top)
         now += STEP_S / inertia * (torque * i_q[n - 1] - brake)
         omega[n] = now
     return 1j * i_q, pairs * omega, voltage(machine, 1j * i_q, pairs * omega)
+
+
+def _reach(machine, omega, most_v) -> tuple[float, float]:
+    """(least, largest) i_q [A] that a voltage drives at a speed, without i_d."""
+    r, x, emf = machine["resistance_ohm"], omega * machine["inductance_q_h"], omega * machine["magnet_flux_wb"]
+    if most_v == np.inf:
+        return -np.inf, np.inf
+    z = r**2 + x**2
+    root = np.sqrt(max((r * emf) ** 2 - z * (emf**2 - most_v**2), 0.0))
+    return (-r * emf - root) / z, (-r * emf + root) / z
 
 
 def voltage(machine: dict, i, omega) -> np.ndarray:

@@ -13,9 +13,9 @@ from studies.scored.truth import Cause, Truth
 
 DRIVES = ("hub_36v", "servo_24v", "drone_24v")
 THROTTLE = Ride()
-GAIT = Ride(hold_s=0.25, smooth_s=0.05, low=-0.9, high=0.95, load=0.1)
+GAIT = Ride(hold_s=0.25, smooth_s=0.05, low=-0.9, high=0.95, load=0.7)
 RIDES = {"throttle": (THROTTLE, (0.02, 0.1)), "gait": (GAIT, (0.02, 0.05))}
-LATE = 0.15  # rad at rated speed
+LATE = 0.15  # rad at rated speed, where that is no more than two periods of the PWM
 OFF = {"healthy": {}, "r130": {"resistance_ohm": 1.3}, "psi90": {"magnet_flux_wb": 0.9}, "late": {}}
 
 
@@ -25,6 +25,7 @@ def _made(drive_name, way, logger, off, rng) -> Made:
     i, omega, u = ride(machine, way, rng)
     if off == "late":
         late = LATE / (machine["pole_pairs"] * machine["rated_speed_rad_s"])
+        late = min(late, 2.0 / drive["inverter"]["pwm_frequency_hz"])
         u, causes = u * np.exp(1j * omega * late), [Cause(("delay",), {"delay_s": (0.95 * late, 1.05 * late)},
                                                          ("sampling_skew", "iron_loss"))]  # fmt: skip
     return Made(logged(i, omega, u, machine, drive["inverter"]["dc_bus_v"], logger, rng), drive, Truth(tuple(causes)))
