@@ -25,7 +25,8 @@ def by_kind(result: dict) -> list[str]:
     for entry in result["cases"]:
         kinds.setdefault(entry["name"].partition(".")[0], []).append(entry["judge"])
     return [
-        f"{kind:12} {len(words):3}: " + ", ".join(f"{words.count(j)} {j}" for j in JUDGES) for kind, words in kinds.items()
+        f"{kind:12} {len(words):3}: " + ", ".join(f"{words.count(j)} {j}" for j in JUDGES)
+        for kind, words in kinds.items()
     ]
 
 

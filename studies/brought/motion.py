@@ -83,7 +83,13 @@ def logged(i, omega, u, machine: dict, bus_v: float, logger: Logger, rng) -> dic
     """The columns of the log, with noise of a thousandth of rated current, bus and highest speed."""
     rows, start = round(logger.row_s / STEP_S), round(SETTLE_S / STEP_S)
     rated = machine["rated_current_a"]
-    parts = {"i_d": (i.real, 0), "i_q": (i.imag, 0), "omega_e": (omega, 1), "u_d_ref": (u.real, 2), "u_q_ref": (u.imag, 2)}
+    parts = {
+        "i_d": (i.real, 0),
+        "i_q": (i.imag, 0),
+        "omega_e": (omega, 1),
+        "u_d_ref": (u.real, 2),
+        "u_q_ref": (u.imag, 2),
+    }
     noise = (rated, np.abs(omega).max(), bus_v)
     out = {"t": np.arange(start, len(i), rows) * STEP_S}
     for name, (x, kind) in parts.items():

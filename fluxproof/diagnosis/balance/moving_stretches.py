@@ -10,7 +10,7 @@ what changes together) is taken from the recorded voltage, so that a stretch is 
 
 The columns of a row are of different age, and the voltage changes while one is waited for.  The log itself shows the
 ages: an age leaves a misfit proportional to the derivative of the nominal voltage by that column, times the column's
-rate of change, which no constant of the machine does.  Both are fitted to all rows together and the columns are shifted.
+rate of change, which no constant of the machine does.  Both are fitted to all rows together; the columns are shifted.
 What the fit leaves open of the ages is an error that all stretches have in common (``aged``): in a throttle run with
 a load that follows the speed, an age of the speed looks like a resistance with less flux.
 
@@ -102,7 +102,7 @@ def moving_log(t, i, u, omega, good, machine, both_axes) -> Moving | None:
 
 
 def _moving_terms(machine, t, i, omega, run):
-    """(steady voltage (n,) [V], its change for an age of current and speed of a second [V/s], inductive voltage [V])."""
+    """(steady voltage (n,) [V], its changes for an age of current and speed of a second [V/s], inductive part [V])."""
     rate_i, rate_w = _rate(t, i, run), _rate(t, omega, run)
     inductive = flux_of_current(rate_i, machine.inductance_d_h, machine.inductance_q_h)
     by_current = machine.resistance_ohm * rate_i + 1j * omega * inductive
@@ -134,8 +134,8 @@ def _ages(t, i, omega, u, run, machine, both_axes) -> Ages | None:
     nominal_u, aged, inductive = _moving_terms(machine, t, i, omega, run)
     turning = 1j * omega + 0.0 * i
     constants = (
-        i, turning, turning * i.real, 1j * turning * i.imag, turning * nominal_u, turning**2 * nominal_u, omega * turning,
-        i / np.maximum(np.abs(i), 1e-9), inductive,
+        i, turning, turning * i.real, 1j * turning * i.imag, turning * nominal_u, turning**2 * nominal_u,
+        omega * turning, i / np.fmax(np.abs(i), 1e-9), inductive,
     )  # fmt: skip
     columns = (*aged, *constants)
     rows = np.isfinite(np.stack([*columns, u, nominal_u])).all(axis=0)

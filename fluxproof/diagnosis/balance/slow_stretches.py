@@ -51,8 +51,9 @@ class Stretches:
     """Means over each stretch, all (b,): dq current and voltage complex [A], [V], electrical speed [rad/s],
     bus [V], winding [degC] or nan, time of the middle since the first row [s], first row and end (exclusive), and the
     change of the voltage from shortly before to shortly after the stretch [V].  rest: angle of a rotor at rest [rad],
-    nan if it turns; aged: (b, 2) error that the ages of current and speed leave in common [V], None without one; both_axes: whether u_d is known, otherwise it is that of the nominal drive; torque: measured at the
-    shaft [Nm], None or nan without a transducer."""
+    nan if it turns; both_axes: whether u_d is known, otherwise it is that of the nominal drive; torque: measured at the
+    shaft [Nm], None or nan without a transducer; aged: (b, 2) error that the ages of current and speed leave in common
+    [V], None where no age was fitted."""
 
     i: Complex
     u: Complex
