@@ -184,6 +184,12 @@ def test_references_beyond_the_voltage_limit_are_not_at_the_machine(tmp_path, no
     assert not recording.usable[599:701].any() and recording.usable[:590].any()
 
 
+def test_a_bus_that_was_not_recorded_may_be_higher_than_its_rating(tmp_path, nominal):
+    table = dq_made()
+    table["u_q_ref"][600:700] = 1.1 * table.pop("u_dc")[600:700] / np.sqrt(3.0)
+    assert "voltage_limit" not in codes(load_recording(write(tmp_path / "r.parquet", table), nominal))
+
+
 def test_references_beyond_the_limit_in_most_rows_have_another_unit(tmp_path, nominal):
     table = dq_made()
     table["u_q_ref"] = 1.2 * table["u_dc"] * np.ones(len(table["t"]))

@@ -16,6 +16,7 @@ from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "channels"
 BEYOND = 1.03  # of u_dc / sqrt(3): noise and gain of the bus sensor
+BEYOND_NOMINAL = 1.2  # the same of a bus that was not recorded: a mains rectifier gives 10 % more than its rating
 MOST = 0.5  # share of rows
 LEAST = 3  # rows that follow each other: fewer are spikes
 
@@ -23,9 +24,10 @@ LEAST = 3  # rows that follow each other: fewer are spikes
 def check(recording, nominal) -> None:
     if recording.points or not recording.has("u_d_ref", "u_q_ref") or recording.has("d_a", "d_b", "d_c"):
         return
-    u_dc = recording["u_dc"] if recording.has("u_dc") else float(nominal.inverter.dc_bus_v)
+    known = recording.has("u_dc")
+    u_dc = recording["u_dc"] if known else float(nominal.inverter.dc_bus_v)
     size = np.hypot(recording["u_d_ref"], recording["u_q_ref"])
-    beyond = size > BEYOND / np.sqrt(3.0) * u_dc
+    beyond = size > (BEYOND if known else BEYOND_NOMINAL) / np.sqrt(3.0) * u_dc
     first, length = runs_of_equal(beyond, LEAST)
     first, length = first[beyond[first]], length[beyond[first]]
     if not len(first) or np.mean(beyond) > MOST:
