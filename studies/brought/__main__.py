@@ -31,7 +31,7 @@ def by_kind(result: dict) -> list[str]:
 
 
 def main(arguments=None) -> int:
-    parser = argparse.ArgumentParser(prog="python -m studies.brought", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="python -m studies.brought", description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--only", action="append", default=[], metavar="WORD", help="cases whose name contains it")
     parser.add_argument("--every", type=int, default=1, metavar="N", help="every Nth case")
     parser.add_argument("--jobs", type=int, default=1, help="diagnoses at once (default: 1)")

@@ -126,12 +126,12 @@ def stretches_in_motion(recording, nominal) -> Stretches | None:
     nominal_u = steady_voltage(nominal.machine, i, omega)
     u, both_axes = known_voltage(u, nominal_u)
     log = moving_log(t, i, u, omega, r.usable & np.isfinite(nominal_u) & np.isfinite(u), nominal.machine, both_axes)
-    top_u = max(np.nanmax(np.abs(nominal_u)), np.nanmax(np.abs(u)), 1e-9)
-    for least_s in LEAST_S:
-        found = [] if log is None else moving_stretches(log, least_s, FEW_TURNS, nominal.machine.rated_current_a, top_u)
-        if len(found) >= ENOUGH:
-            break
-    else:
+    if log is None:
+        return None
+    rated, top_u = nominal.machine.rated_current_a, max(np.nanmax(np.abs(nominal_u)), np.nanmax(np.abs(u)), 1e-9)
+    tries = ((least_s, moving_stretches(log, least_s, FEW_TURNS, rated, top_u)) for least_s in LEAST_S)
+    least_s, found = next(((s, parts) for s, parts in tries if len(parts) >= ENOUGH), (0.0, []))
+    if not found:
         return None
     first, end, unsteady = (np.array(x) for x in zip(*found, strict=True))
     mean = lambda x: np.array([np.mean(x[a:b]) for a, b, _ in found])  # noqa: E731

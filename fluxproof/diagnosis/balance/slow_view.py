@@ -65,7 +65,7 @@ class SlowView(View):
         return np.hypot(own, k.SLOW_CHANGE * self.unsteady)
 
     def common_errors(self):
-        ages = self.aged.T[:, :, None] * np.ones(self.u_dc.shape[1]) if np.any(self.aged) else ()
+        ages = np.asarray(self.aged).T[..., None] * np.ones(self.u_dc.shape[1]) if np.any(self.aged) else ()
         return (*super().common_errors(), *ages)
 
     def _advance(self, count, first=0.5):
