@@ -40,7 +40,7 @@ def _current_limit(name, off, rng) -> Made:
     machine, causes = true_machine(drive, **OFF[off])
     way = Ride(low=-0.3, high=1.6)
     i, omega, _ = ride(machine, way, rng)
-    i = 1j * np.clip(i.imag, -np.inf, machine["rated_current_a"])
+    i = 1j * np.clip(np.imag(i), -np.inf, machine["rated_current_a"])
     columns = logged(i, omega, voltage(machine, i, omega), machine, drive["inverter"]["dc_bus_v"], Logger(), rng)
     return Made(columns, drive, Truth(tuple(causes), readings=AT_LIMIT))
 

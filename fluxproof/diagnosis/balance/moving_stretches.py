@@ -20,6 +20,7 @@ This needs a new value in every row: a log of messages that are held does not sh
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -117,7 +118,7 @@ def _rate(t, x, run):
     return out
 
 
-def _shifted(t, x, run, age):
+def _shifted(t, x, run, age) -> Any:
     """The column (n,) at the instants of the voltage, nan where a run does not reach them."""
     out = np.full(len(x), np.nan, x.dtype)
     edges = np.flatnonzero(np.diff(run)) + 1
@@ -129,7 +130,7 @@ def _shifted(t, x, run, age):
     return out
 
 
-def _ages(t, i, omega, u, run, machine, both_axes) -> Ages | None:
+def _ages(t, i: Complex, omega, u, run, machine, both_axes) -> Ages | None:
     """Ages beside errors of the constants, least squares over all rows; None if there are too few."""
     nominal_u, aged, inductive = _moving_terms(machine, t, i, omega, run)
     turning = 1j * omega + 0.0 * i
@@ -138,24 +139,28 @@ def _ages(t, i, omega, u, run, machine, both_axes) -> Ages | None:
         omega * turning, i / np.fmax(np.abs(i), 1e-9), inductive,
     )  # fmt: skip
     columns = (*aged, *constants)
-    rows = np.isfinite(np.stack([*columns, u, nominal_u])).all(axis=0)
+    rows = np.array(np.isfinite(np.stack([*columns, u, nominal_u])).all(axis=0))
     if rows.sum() < FIT_ROWS:
         return None
-    for _ in range(2):
-        a, y = np.stack(columns, axis=1)[rows], (u - nominal_u - inductive)[rows]
-        a, y = (np.concatenate([x.real, x.imag]) if both_axes else x.imag for x in (a, y))
-        scale = np.maximum(np.sqrt((a**2).mean(axis=0)), 1e-30)
-        c, _, rank, _ = np.linalg.lstsq(a / scale, y, rcond=1e-9)
-        left = y - a / scale @ c
-        rms = float(np.sqrt(np.mean(left**2)))
-        far = np.abs(left) > OUTLIER * rms
-        far = far.reshape(2, -1).any(axis=0) if both_axes else far
-        kept = np.flatnonzero(rows)[~far]
-        rows = np.zeros(len(rows), bool)
-        rows[kept] = True
-    inverse = np.linalg.pinv((a / scale).T @ (a / scale), rcond=1e-12)
-    sigma = rms * np.sqrt(np.diag(inverse)) / scale
-    return Ages(c[0] / scale[0], c[1] / scale[1], (float(sigma[0]), float(sigma[1])))
+    y = u - nominal_u - inductive
+    _, _, left = _least_squares(columns, y, rows, both_axes)
+    far = np.abs(left) > OUTLIER * np.sqrt(np.mean(left**2))
+    rows[np.flatnonzero(rows)[far.reshape(-1, rows.sum()).any(axis=0)]] = False
+    c, sigma, _ = _least_squares(columns, y, rows, both_axes)
+    return Ages(float(c[0]), float(c[1]), (float(sigma[0]), float(sigma[1])))
+
+
+def _least_squares(columns, y, rows, both_axes):
+    """(coefficients, sigmas, residuals of the d and q axis one after the other, or of the q axis)."""
+    a, y = np.stack(columns, axis=1)[rows], y[rows]
+    a, y = (np.concatenate([np.real(x), np.imag(x)]) if both_axes else np.imag(x) for x in (a, y))
+    scale = np.maximum(np.sqrt((a**2).mean(axis=0)), 1e-30)
+    a = a / scale
+    inverse = np.linalg.pinv(a.T @ a, rcond=1e-12)
+    c = inverse @ (a.T @ y)
+    left = y - a @ c
+    sigma = np.sqrt(np.mean(left**2) * np.maximum(np.diag(inverse), 0.0))
+    return c / scale, sigma / scale, left
 
 
 def moving_stretches(log: Moving, least_s, turns, rated, top_u) -> list[tuple[int, int, float]]:
