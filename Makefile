@@ -26,7 +26,7 @@ unexport PYTHONHOME
 
 PYTHON_RUN := .venv/bin/python
 
-.PHONY: help setup generate test slow demo papers hil speed bench blind fleet sensitivity real mishaps compare timeline mutate verilog synth ecp5 lint registers package prove faults rough board fuzz lock clean distclean
+.PHONY: help setup generate test slow demo papers hil speed bench blind fleet sensitivity real mishaps brought compare timeline mutate verilog synth ecp5 lint registers package prove faults rough board fuzz lock clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -79,6 +79,9 @@ real: setup ## diagnose and judge the recordings of real drives and benches (ARG
 
 mishaps: setup ## diagnose and judge everyday mishaps of recordings on three simulated drives (ARGS='--only rpm --base servo')
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.mishaps $(ARGS)
+
+brought: setup ## diagnose and judge files as benches bring them, with counts by kind (ARGS='--only gait --every 4')
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.brought $(ARGS)
 
 compare: setup ## diagnose the same cases with alternative methods
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.compare $(ARGS)

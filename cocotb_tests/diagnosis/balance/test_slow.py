@@ -10,10 +10,15 @@ import pytest
 
 from cocotb_tests.support.recordings.slow_logs import LEVELS, NOMINAL, Truth, log
 from fluxproof.diagnosis.balance.misfit import misfit
-from fluxproof.diagnosis.balance.slow_stretches import Stretches, message_period, stretches
+from fluxproof.diagnosis.balance.slow_stretches import Stretches, message_period, stretches, stretches_in_motion
 from fluxproof.diagnosis.balance.slow_view import alike, slow_view
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.ground.recording import RecordingError
+from fluxproof.diagnosis.ground.machine import steady_voltage
+from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.ground.recording import RecordingError, from_columns
+from studies.brought.drives import FOLDER, drive_of, true_machine
+from studies.brought.motion import Logger, logged, ride
+from studies.brought.moving import GAIT, THROTTLE
 
 
 def test_stretches_lie_within_the_dwells():
@@ -87,3 +92,41 @@ def test_readings_of_two_temperatures_are_no_noise():
     _, dwell = alike(moved, NOMINAL)
     assert len(np.unique(dwell)) == 12
     assert len(np.unique(alike(replace(moved, temp=np.full(12, np.nan)), NOMINAL)[1])) == 4
+
+
+def _gait(way, logger, **factors):
+    """A recording of a ride with the servo drive of docs/drives, whose machine is off by factors."""
+    drive = drive_of("servo_24v")
+    rng = np.random.default_rng(50)
+    machine, _ = true_machine(drive, **factors)
+    i, omega, u = ride(machine, way, rng)
+    columns = logged(i, omega, u, machine, drive["inverter"]["dc_bus_v"], logger, rng)
+    return replace(from_columns(columns, logger.row_s), slow=True), load_nominal(FOLDER / "servo_24v.toml")
+
+
+def test_gait_is_balanced_in_motion():
+    """Steady stretches are too rare; the log itself shows the ages (-7 and -4 ms) and the resistance."""
+    recording, nominal = _gait(replace(GAIT, seconds=40.0), Logger(0.02), resistance_ohm=1.3)
+    found = stretches(recording, nominal)
+    assert "current -7" in found.notes[0] and "speed -4" in found.notes[0]
+    u = found.u - steady_voltage(nominal.machine, found.i, found.omega)
+    share = np.sum(u.imag * found.i.imag) / np.sum(found.i.imag**2) / nominal.machine.resistance_ohm
+    left = u - share * nominal.machine.resistance_ohm * found.i
+    assert share == pytest.approx(0.3, abs=0.01) and np.sqrt(np.mean(np.abs(left) ** 2)) < 0.02
+
+
+def test_age_that_the_rows_leave_open_is_a_common_error():
+    """Where the load follows the speed, an age of the speed resembles a resistance with less flux."""
+    recording, nominal = _gait(replace(THROTTLE, seconds=40.0), Logger(0.1))
+    view = slow_view(recording, nominal)
+    errors = view.common_errors()
+    assert len(errors) == 5 and all(np.abs(e).max() > 0.0 for e in errors)
+    assert len(slow_view(log(), NOMINAL).common_errors()) == 3
+
+
+def test_held_messages_are_not_balanced_in_motion():
+    recording, nominal = _gait(replace(GAIT, seconds=40.0), Logger(0.02))
+    for name in ("i_q", "u_q_ref", "omega_e"):
+        held = recording[name]
+        recording.columns[name] = held[np.arange(len(held)) // 10 * 10]
+    assert stretches_in_motion(recording, nominal) is None

@@ -170,3 +170,28 @@ def test_single_lost_rows_are_filled_where_no_stretch_is_whole(tmp_path, nominal
 def test_a_few_lost_rows_are_left_as_gaps(tmp_path, nominal):
     recording = load(tmp_path, nominal, {n: np.delete(v, [700, 1500, 3000]) for n, v in made().items()})
     assert codes(recording) == ["gap"] and len(recording) == 3997
+
+
+def test_references_beyond_the_voltage_limit_are_not_at_the_machine(tmp_path, nominal):
+    """A regulator that is not limited asks for more than the bus gives: its rows are set aside and told."""
+    table = dq_made()
+    most = table["u_dc"] / np.sqrt(3.0)
+    beyond = slice(600, 700)
+    table["u_q_ref"][beyond] = 1.2 * most[beyond]
+    recording = load_recording(write(tmp_path / "r.parquet", table), nominal)
+    found = [p for p in recording.problems if p.code == "voltage_limit"]
+    assert len(found) == 1 and (found[0].row, found[0].count) == (600, 100) and not recording.fatal
+    assert not recording.usable[599:701].any() and recording.usable[:590].any()
+
+
+def test_a_bus_that_was_not_recorded_may_be_higher_than_its_rating(tmp_path, nominal):
+    table = dq_made()
+    table["u_q_ref"][600:700] = 1.1 * table.pop("u_dc")[600:700] / np.sqrt(3.0)
+    assert "voltage_limit" not in codes(load_recording(write(tmp_path / "r.parquet", table), nominal))
+
+
+def test_references_beyond_the_limit_in_most_rows_have_another_unit(tmp_path, nominal):
+    table = dq_made()
+    table["u_q_ref"] = 1.2 * table["u_dc"] * np.ones(len(table["t"]))
+    recording = load_recording(write(tmp_path / "r.parquet", table), nominal)
+    assert "voltage_limit" not in codes(recording)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cocotb_tests.support.recordings.from_equations import codes, dq_made, nominal_of, write
+from cocotb_tests.support.recordings.from_equations import U_DC, codes, dq_made, nominal_of, write
 from fluxproof.diagnosis.column_maps import maps
 from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
 from fluxproof.diagnosis.loading.load import load_recording
@@ -47,6 +47,11 @@ LOGS = {
     "WaveSculptor": (
         f"t_s=t id_A=i_d iq_A=i_q vd_V=u_d_ref vq_V=u_q_ref n_rpm=omega_e*{60 / 8 / np.pi} u_dc_V=u_dc",
         {"T_motor_C": 33.0},
+    ),
+    "openinverter": (
+        f"time=t id=i_d iq=i_q ud=u_d_ref*{65536 / U_DC} uq=u_q_ref*{65536 / U_DC} udc=u_dc"
+        f" fstat=omega_e*{0.5 / np.pi}",
+        {"tmpm": 40.0, "opmode": 2.0},
     ),
     "LAAS omodri": ("Time=t Velocity=omega_e*0.25 Iq=i_q Uq=u_q_ref", {"Position": 0.0, "Vsupply": 0.47}),
 }

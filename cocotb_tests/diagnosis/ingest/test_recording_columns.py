@@ -259,3 +259,23 @@ def test_a_dyno_sheet_is_told_what_its_missing_voltages_would_add(tmp_path):
     (tmp_path / "dyno.csv").write_text("rpm,iq (A),T measured (Nm),bus (A)\n" + "100,1.5,0.2,0.1\n" * 8)
     with pytest.raises(RecordingError, match=r"torque, i_q and omega_e \(a dyno sheet\) give flux and friction"):
         load_recording(tmp_path / "dyno.csv", nominal_of(tmp_path))
+
+
+REFUSED = {
+    "flux map": ("i_d_a i_q_a psi_d_wb psi_q_wb", r"\[plant.machine\] flux_map"),
+    "no names": ("1 2 3 4", "one row per operating point"),
+    "no voltages": ("t i_d i_q omega_e", "u_q_ref alone would show R and flux.*dyno sheet"),
+    "one axis": ("t i_q u_d_ref u_q_ref omega_e", "i_d would show L_d and the angle"),
+    "no speed": ("t i_d i_q u_d_ref u_q_ref", "omega_e would show steady effects"),
+    "supply": ("t i_dc u_dc", "supply alone show nothing.*EMF run"),
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_refusal_says_what_would_do(tmp_path, nominal, kind):
+    names, says = REFUSED[kind]
+    rows = [",".join(str(0.01 * k + n) for n in range(len(names.split()))) for k in range(60)]
+    path = tmp_path / "r.csv"
+    path.write_text(("" if kind == "no names" else names.replace(" ", ",") + "\n") + "\n".join(rows) + "\n")
+    with pytest.raises(RecordingError, match=says):
+        load_recording(path, nominal)

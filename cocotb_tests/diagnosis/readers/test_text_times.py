@@ -10,6 +10,7 @@ import pytest
 from cocotb_tests.support.recordings.from_equations import T, as_text, codes, made, nominal_of
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.loading.load import load_recording
+from fluxproof.diagnosis.readers.text import read
 
 
 @pytest.fixture(scope="module")
@@ -97,3 +98,14 @@ def test_a_header_inside_is_one_finding(tmp_path, nominal, table, inside, says):
     assert codes(recording) == ["header_inside", "time_order"]
     assert f"line 802 {says}" in recording.problems[0].message
     assert len(recording) == 2 * len(table["t"]) and np.count_nonzero(~recording.joined) == 2
+
+
+def test_names_of_time_zones_and_an_index_without_a_name_are_a_time(tmp_path):
+    """One name of a zone in all rows is no part of the time; two are summer time's begin, which nobody can convert."""
+    rows = [f"2026-05-01 12:00:00.{k:03d} CEST,{k}.5" for k in range(40)]
+    path = tmp_path / "r.csv"
+    path.write_text(",i_d\n" + "\n".join(rows) + "\n")
+    table = read(path)
+    np.testing.assert_allclose(table.columns["t"], np.arange(40) * 1e-3, atol=1e-9)
+    path.write_text("t,i_d\n" + "\n".join([*rows[:20], *(row.replace("CEST", "CET") for row in rows[20:])]) + "\n")
+    assert "t" not in read(path).columns

@@ -8,6 +8,8 @@ largest voltage, every signal that is not at rest has been updated, and the roto
 after a stretch bound the error due to values of different age: ``unsteady``.
 
 A rotor at rest is steady too, if its angle is known: the inverter loss depends on it.
+
+A log that is seldom steady but has a new value in every row is cut into moving stretches (moving_stretches.py).
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fluxproof.diagnosis.balance.moving_stretches import moving_log, moving_stretches
 from fluxproof.diagnosis.balance.shaft import airgap, is_airgap
 from fluxproof.diagnosis.ground.arrays import Complex
 from fluxproof.diagnosis.ground.machine import steady_voltage
@@ -39,6 +42,7 @@ MESSAGE_ROWS = 3.0  # rows; a signal that changes as often has no messages
 PARTS = 4  # of a stretch without messages
 NOISE = 3.0  # standard deviations: usual range of PARTS means
 COMPUTED = 5e-4  # of the torque: what a measured one differs from the formula at least
+SELDOM = 0.4  # share of the rows in steady stretches of a log that is seldom steady
 AT_REST = 0.05  # rad within a stretch: the rotor does not turn
 
 
@@ -48,7 +52,8 @@ class Stretches:
     bus [V], winding [degC] or nan, time of the middle since the first row [s], first row and end (exclusive), and the
     change of the voltage from shortly before to shortly after the stretch [V].  rest: angle of a rotor at rest [rad],
     nan if it turns; both_axes: whether u_d is known, otherwise it is that of the nominal drive; torque: measured at the
-    shaft [Nm], None or nan without a transducer."""
+    shaft [Nm], None or nan without a transducer; aged: (b, 2) error that the ages of current and speed leave in common
+    [V], None where no age was fitted."""
 
     i: Complex
     u: Complex
@@ -64,6 +69,7 @@ class Stretches:
     both_axes: bool = True
     notes: tuple[str, ...] = ()
     torque: np.ndarray | None = None
+    aged: Complex | None = None
 
     def __len__(self):
         return len(self.t)
@@ -74,9 +80,8 @@ class Stretches:
             return self
         parts = np.array_split(np.arange(len(self)), most)
         names = ("i", "u", "omega", "u_dc", "temp", "t")
-        if self.torque is not None:
-            names = (*names, "torque")
-        mean = {name: np.array([getattr(self, name)[k].mean() for k in parts]) for name in names}
+        names += tuple(name for name in ("torque", "aged") if getattr(self, name) is not None)
+        mean = {name: np.array([getattr(self, name)[k].mean(axis=0) for k in parts]) for name in names}
         largest = np.array([self.unsteady[k].max() for k in parts])
         begin, last = (np.array([k[edge] for k in parts]) for edge in (0, -1))
         return replace(
@@ -101,9 +106,43 @@ def stretches(recording: Recording, nominal) -> Stretches:
             best = points, found
         if points >= ENOUGH:
             break
+    if best is None or np.sum(best[1].end - best[1].first) < SELDOM * len(recording):
+        moving = stretches_in_motion(recording, nominal)
+        if moving is not None:
+            return moving
     if best is None:
         raise refused or RecordingError(f"{recording.source}: no steady stretch")
     return best[1]
+
+
+def stretches_in_motion(recording, nominal) -> Stretches | None:
+    """The stretches of a log that is seldom steady; None if its rows hold messages or do not balance in motion."""
+    r = recording
+    i, u, omega, u_dc = operating_columns(r, nominal)
+    t = r["t"] - r["t"][0]
+    longest = max(message_period(t, x) for x in (i.real, i.imag, u.real, u.imag, omega))
+    if longest >= MESSAGE_ROWS * np.median(np.diff(t)):
+        return None
+    nominal_u = steady_voltage(nominal.machine, i, omega)
+    u, both_axes = known_voltage(u, nominal_u)
+    log = moving_log(t, i, u, omega, r.usable & np.isfinite(nominal_u) & np.isfinite(u), nominal.machine, both_axes)
+    if log is None:
+        return None
+    rated, top_u = nominal.machine.rated_current_a, max(np.nanmax(np.abs(nominal_u)), np.nanmax(np.abs(u)), 1e-9)
+    tries = ((least_s, moving_stretches(log, least_s, FEW_TURNS, rated, top_u)) for least_s in LEAST_S)
+    least_s, found = next(((s, parts) for s, parts in tries if len(parts) >= ENOUGH), (0.0, []))
+    if not found:
+        return None
+    first, end, unsteady = (np.array(x) for x in zip(*found, strict=True))
+    mean = lambda x: np.array([np.mean(x[a:b]) for a, b, _ in found])  # noqa: E731
+    current, speed = mean(log.i), mean(log.omega)
+    beyond = mean(log.nominal_u) - steady_voltage(nominal.machine, current, speed)
+    temp = r["temp_winding"] if r.has("temp_winding") else np.full(len(t), np.nan)
+    return Stretches(
+        current, mean(u) - beyond, speed, mean(u_dc), mean(temp), mean(t), first, end, unsteady,
+        np.full(len(first), np.nan), least_s, both_axes, (log.note(),),
+        aged=np.array([np.mean(log.aged[a:b], axis=0) for a, b, _ in found]) * log.doubt(),
+    )  # fmt: skip
 
 
 def _operating_points(found, nominal) -> int:

@@ -45,13 +45,15 @@ class SlowView(View):
     unsteady: (b,) change of the voltage around each stretch [V].
     rest: (b,) angle of a rotor at rest [rad], nan if it turns.
     d_known: (b,) bool, whether the d voltage was recorded.
+    aged: (b, 2) error that the ages of two columns leave in common (moving_stretches.py) [V].
     """
 
     unsteady: np.ndarray | float = 0.0
     rest: np.ndarray | float = np.nan
     d_known: np.ndarray | bool = True
+    aged: Complex | float = 0.0
 
-    stacked = (*STACKED, "unsteady", "rest", "d_known")
+    stacked = (*STACKED, "unsteady", "rest", "d_known", "aged")
 
     @property
     def least_error(self):
@@ -61,6 +63,10 @@ class SlowView(View):
         level = np.abs(self.u).mean(axis=1)
         own = k.SLOW_DC * self.nominal.inverter.dc_bus_v + k.SLOW_U * level
         return np.hypot(own, k.SLOW_CHANGE * self.unsteady)
+
+    def common_errors(self):
+        ages = np.asarray(self.aged).T[..., None] * np.ones(self.u_dc.shape[1]) if np.any(self.aged) else ()
+        return (*super().common_errors(), *ages)
 
     def _advance(self, count, first=0.5):
         """Angle of the rotor at intervals counted from the first sample, (b, count) [rad]."""
@@ -151,6 +157,7 @@ def view_of_points(found: Stretches, recording, nominal, catalogue: dict | None 
         unsteady=found.unsteady[order],
         rest=found.rest[order],
         d_known=np.full(b, found.both_axes),
+        aged=np.zeros((b, 2), complex) if found.aged is None else found.aged[order],
         lacks=lacking(lacks, b),
     )
 

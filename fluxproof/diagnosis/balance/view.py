@@ -210,6 +210,15 @@ class View:
         level = np.abs(self.to_dq(self.u[:, 1:-1]).mean(axis=1))
         return k.BALANCE_U * level + k.BALANCE_DC * self.nominal.inverter.dc_bus_v
 
+    def common_errors(self):
+        """Errors of the balance that all operating points have in common, (b, m) complex [V], each of a usual size.
+
+        Along and across the voltage, as the converters' timing; along the current, as minimum pulses.
+        """
+        u, bus = self.to_dq(self.u[:, 1:-1]), self.nominal.inverter.dc_bus_v
+        along = self.i_mid / np.abs(self.i_mid).clip(0.02 * self.machine.rated_current_a)
+        return k.COMMON_U * u, 1j * k.COMMON_U * u, k.COMMON_DC * bus * along
+
     def stator(self, dq):
         """A dq quantity of the samples in the stator frame."""
         return dq * self.turn

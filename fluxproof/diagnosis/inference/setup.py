@@ -102,15 +102,8 @@ class Setup:
 
 
 def _common_error(setup) -> np.ndarray:
-    """(r, 3) errors of the balance that all operating points have in common, each of the size of its prior.
-
-    Along and across the voltage, as the converters' timing; along the current, as minimum pulses.
-    """
-    view = setup.view
-    u, bus = view.to_dq(view.u[:, 1:-1]), view.nominal.inverter.dc_bus_v
-    along = view.i_mid / np.abs(view.i_mid).clip(0.02 * view.machine.rated_current_a)
-    patterns = (k.COMMON_U * u, 1j * k.COMMON_U * u, k.COMMON_DC * bus * along)
-    return np.array([setup.projector.rows({"u": p}) for p in patterns]).T
+    """(r, n) errors of the balance that all operating points have in common, each of the size of its prior."""
+    return np.array([setup.projector.rows({"u": p}) for p in setup.view.common_errors()]).T
 
 
 def _bounded_noise(rows):

@@ -34,6 +34,7 @@ from fluxproof.diagnosis.ingest.entries import entry_of, nearest
 from fluxproof.diagnosis.ingest.stated import constants_of
 from fluxproof.diagnosis.ingest.units import COMMANDED, OF_BUS, conversion, known_units, split_unit
 from fluxproof.diagnosis.ingest.usual_names import TOLD, usual
+from fluxproof.diagnosis.ingest.worth import worth
 from fluxproof.diagnosis.readers.table import Table, shown
 
 MOST_GUESSES = 6
@@ -248,19 +249,8 @@ def _demand(plan, names, path) -> None:
         raise RecordingError(
             f"{path}: missing {' and '.join(missing)}; found columns {found or 'none'}{_guesses(missing, names)}; "
             f"name them in [columns] of drive.toml, or give a value that was constant in [constants]{why}"
-            f"{_worth(missing, names)}"
+            f"{worth(missing, names, set(plan.sources) | set(plan.assumed))}"
         )
-
-
-def _worth(missing, names) -> str:
-    """What is enough of a dyno sheet, as the end of a message; "" for other files."""
-    dyno = any(re.search(r"torque|drehmoment|\bN[ .*]?mm?\b", f"{name} {unit}", re.I) for name, unit in names.items())
-    if not dyno or not any(text.startswith("voltages") for text in missing):
-        return ""
-    return (
-        ". Without voltages torque, i_q and omega_e (a dyno sheet) give flux and friction; the control's u_q_ref would "
-        "add R and a scale of the currents, u_d_ref also inductances and the angle"
-    )
 
 
 def _not_used(plan, left) -> None:

@@ -141,7 +141,13 @@ OF_SHAFT = {
     "rps",
 }
 # Voltages as a modulation index: shares of the bus voltage of the same row.
-OF_BUS = {"u_dc": 1.0, "u_dc/2": 0.5, "u_dc/sqrt(3)": 1.0 / math.sqrt(3.0), "2/pi u_dc": 2.0 / math.pi}
+OF_BUS = {
+    "u_dc": 1.0,
+    "u_dc/2": 0.5,
+    "u_dc/sqrt(3)": 1.0 / math.sqrt(3.0),
+    "2/pi u_dc": 2.0 / math.pi,
+    "u_dc/65536": 1.0 / 65536.0,
+}
 COMMANDED = ("u_d_ref", "u_q_ref")
 OFFSETS = {"K": -273.15, "degF": -160 / 9, "°F": -160 / 9}
 

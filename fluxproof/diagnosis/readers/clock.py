@@ -9,7 +9,8 @@ import numpy as np
 
 DAY = 86400.0
 CLOCK = r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?"
-ISO = rf"\d{{4}}-\d{{2}}-\d{{2}}[T ]{CLOCK}\s*(Z|[+-]\d{{2}}:?\d{{2}})?"
+ISO = rf"\d{{4}}-\d{{2}}-\d{{2}}[T ]{CLOCK}\s*(Z|[+-]\d{{2}}:?\d{{2}}|[A-Z]{{3,5}})?"
+ZONE = r"\s*([A-Z]{3,5})$"  # the name of a time zone
 DOTTED = rf"\d{{1,2}}\.\d{{1,2}}\.\d{{4}} {CLOCK}"
 MOMENT = re.compile(rf"{CLOCK}|{ISO}|{DOTTED}", re.ASCII)
 
@@ -27,6 +28,11 @@ def moments(values, pd) -> np.ndarray | None:
         texts = texts.where(texts.str.contains(r":\d{2}\.", regex=True), texts + ".0")
         stamps = pd.to_datetime(texts, format="%d.%m.%Y %H:%M:%S.%f", errors="coerce")
     else:
+        zones = texts.str.extract(ZONE, expand=False)
+        if zones.nunique() > 1:  # summer time began or ended: only an offset in numbers tells by how much
+            return None
+        if zones.notna().any():
+            texts = texts.str.replace(ZONE, "", regex=True)
         stamps = pd.to_datetime(texts, format="ISO8601", errors="coerce", utc=True).dt.tz_localize(None)
     return seconds(stamps.to_numpy("M8[ns]"))
 

@@ -90,7 +90,16 @@ def sniff(path) -> Layout:
     above = split(lines[first - 1], separator) if first else []
     if names[0] == "1" and len(above) > 2 and all(above) and separator != " ":
         raise RecordingError(f"{path}:{first}: a header of {len(above)} names above rows of {width} fields")
-    return Layout(encoding, separator, decimal, first, names, units)
+    return Layout(encoding, separator, decimal, first, _with_time(names, split(lines[first], separator)), units)
+
+
+def _with_time(names, values) -> list[str]:
+    """The names, with "t" for a column of dates without one beside named ones, as of an index that was exported."""
+    unnamed = [k for k, name in enumerate(names) if name == str(k + 1) and MOMENT.fullmatch(values[k])]
+    header = any(name != str(k + 1) for k, name in enumerate(names))
+    if header and len(unnamed) == 1 and not {"t", "time", "timestamp"} & {n.lower() for n in names}:
+        names[unnamed[0]] = "t"
+    return names
 
 
 def _fields_in(head: bytes, encoding: str) -> str:
