@@ -33,6 +33,17 @@ def test_stretches_span_two_messages_of_the_slowest_signal():
     assert stretches(recording, NOMINAL).window_s >= 0.9
 
 
+def test_a_log_of_whole_messages_has_no_slow_signal():
+    """The current of an idle drive rests now and then, which is no wait for a message."""
+    rng, t = np.random.default_rng(5), 0.08 * np.arange(800)
+    noisy = np.round(rng.normal(2.0, 0.3, 800), 2)
+    idle = np.where(np.sin(0.3 * t) > 0.0, noisy, 0.0)
+    idle[1::25] = idle[::25]  # a row as the one before
+    assert message_period(t, idle) == pytest.approx(0.08)
+    assert message_period(t, np.repeat(noisy[::4], 4)) > 0.2
+    assert message_period(t, np.interp(t, t[::4], noisy[::4])) > 0.2
+
+
 def test_value_without_update_is_not_used():
     recording = log()
     frozen = recording["t"] > 0.5 * recording["t"][-1]

@@ -234,6 +234,7 @@ class Diagnosis:
     sentence: str
     effects: tuple[NamedEffect, ...] = ()
     ambiguity: tuple[tuple[str, ...], ...] = ()
+    alternatives: tuple[NamedEffect, ...] = ()  # the effects of the ambiguities, each as it is if it is the one
     next_recording: tuple[Request, ...] = ()
     location: Location = Location()
     fit: Fit = Fit()
