@@ -272,8 +272,9 @@ def message_period(t, x) -> float:
 
 def _is_in_every_row(x) -> bool:
     """Whether a signal, where it is not at rest, neither holds a value nor is interpolated over two rows or more."""
-    active = np.abs(x) > REST * np.nanmax(np.abs(x))
-    moves, bends = (np.diff(x, n) != 0 for n in (1, 2))
+    largest = np.nanmax(np.abs(x))
+    active = np.abs(x) > REST * largest
+    moves, bends = (np.abs(np.diff(x, n)) > 1e-9 * largest for n in (1, 2))
     return bool(active[2:].any() and min(moves[active[1:]].mean(), bends[active[2:]].mean()) > EVERY_ROW)
 
 

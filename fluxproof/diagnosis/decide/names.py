@@ -17,7 +17,6 @@ from fluxproof.diagnosis.balance.shaft import measures_torque
 from fluxproof.diagnosis.decide.ambiguity import ambiguities
 from fluxproof.diagnosis.decide.credibility import credibilities
 from fluxproof.diagnosis.decide.estimates import estimates_in
-from fluxproof.diagnosis.decide.sized import has_size
 from fluxproof.diagnosis.effects.constant import Constant
 from fluxproof.diagnosis.effects.drive_file import Restates
 from fluxproof.diagnosis.ground import constants as k
@@ -69,7 +68,7 @@ def names_of(posterior) -> Names:
     sure = {n: p for n, p in present.items() if p >= 1.0 - k.DOUBTED and n in best.names}
     named = {n: p for n, p in sure.items() if effects[n].named}
     suspects = _no_imitations({n: p for n, p in sure.items() if not effects[n].named}, best)
-    groups = tuple(_with_what_depends(g, named, kept) for g in ambiguities(kept, _sized(present, kept), sure, effects))
+    groups = tuple(_with_what_depends(g, named, kept) for g in ambiguities(kept, present, sure, effects))
     twins = [n for n in named if _has_a_twin(n, effects, groups)]
     if twins and not measures_torque(posterior.setup.view):  # which a wrong current changes, and a wrong nameplate not
         groups += tuple(_with_its_twin(n, effects[n], best.c[n]) for n in twins)
@@ -89,16 +88,6 @@ def _no_imitations(suspects, fit) -> dict[str, float]:
     """
     real = credibilities(fit) if suspects else {}
     return {n: p for n, p in suspects.items() if real[n] >= 1.0 - k.DOUBTED}
-
-
-def _sized(present, kept) -> dict[str, float]:
-    """The effects whose size, in the most probable set that contains them, differs from that of their absence."""
-    return {n: p for n, p in present.items() if _has_size(next(fit for _, fit in kept if n in fit.names), n)}
-
-
-def _has_size(fit, name) -> bool:
-    effect, nominal = fit.problem.setup.effects[name], fit.problem.view.nominal
-    return has_size(estimates_in(fit, name), effect, fit.c[name], nominal)
 
 
 def _has_a_twin(name, effects, groups) -> bool:

@@ -3,7 +3,6 @@
 
 from fluxproof.diagnosis.inference.judged import CONVERGED, Judged, Names
 
-
 MOST = 24  # sets that lose their lead by it, one after another
 
 
