@@ -8,12 +8,11 @@ import pytest
 
 from cocotb_tests.support.drives import PAPER
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.decide import held_out, sized
+from fluxproof.diagnosis.decide import held_out
 from fluxproof.diagnosis.decide.names import Names
 from fluxproof.diagnosis.decide.relevant import relevant_names
 from fluxproof.diagnosis.decide.sized import has_size
 from fluxproof.diagnosis.ground.nominal import load_nominal
-from fluxproof.diagnosis.ground.result import Estimate, NamedEffect
 
 NOMINAL = load_nominal(PAPER)
 KEYS = {"resistance": "delta_r", "magnet_flux": "delta_psi_m", "inductance_d": "delta_l_d", "inductance_q": "delta_l_q",
@@ -76,23 +75,3 @@ def test_a_mean_torque_counts_beside_the_noise_of_its_ripple(monkeypatch):
     assert held_out.helps(posterior, "a", np.ones(1, bool))
     left[means] = 4.1  # it explains nothing there
     assert not held_out.helps(posterior, "a", np.ones(1, bool))
-
-
-def test_an_alternative_without_a_size_is_rejected_unless_a_name_has_none(monkeypatch):
-    """A saturation of 0 +- 1 mWb beside a d-axis inductance of 91 %: neither was named."""
-    parameter = lambda value, sigma: {"x": Estimate(value, sigma, "1")}  # noqa: E731
-    effect = SimpleNamespace(estimates=lambda c, covariance, nominal: parameter(0.0, 0.0))
-    view, sizes = SimpleNamespace(nominal=None), {"a": parameter(5.0, 1.0), "b": parameter(1.0, 1.0)}
-    own = {"problem": SimpleNamespace(view=view), "vector": np.array([1.0, 1.0]), "cov": np.eye(2)}
-    fits = [SimpleNamespace(names=(n,), c={n: {"x": 1.0}}, places={n: [0, 1]}, **own) for n in "ab"]
-    posterior = SimpleNamespace(best=lambda: fits[0], setup=SimpleNamespace(effects=dict.fromkeys("abn", effect)))
-    names = Names({}, (("a", "b"),), {}, {}, tuple((0.5, fit) for fit in fits))
-    monkeypatch.setattr(sized, "estimates_in", lambda fit, name: sizes[name])
-    monkeypatch.setattr(sized, "named_effects", lambda *given: [])
-    assert sized.sizeless(names, posterior) == {"b"}
-    fits[1].vector = np.array([1.0, 9.0])  # its free curve has a size
-    assert sized.sizeless(names, posterior) == set()
-    fits[1].vector = np.array([1.0, 1.0])
-    fits[0].c["n"] = {"x": 1.0}
-    monkeypatch.setattr(sized, "named_effects", lambda *given: [NamedEffect("n", 1.0, parameter(1.0, 1.0), 0.0)])
-    assert sized.sizeless(names, posterior) == {"n"}

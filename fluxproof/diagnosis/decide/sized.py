@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from fluxproof.diagnosis.decide.estimates import estimates_in, named_effects
+from fluxproof.diagnosis.decide.estimates import named_effects
 from fluxproof.diagnosis.effects import DOUBT
 from fluxproof.diagnosis.ground.result import Estimate
 
@@ -19,27 +19,14 @@ VANISHES = 1e6  # times the value: a parameter that grows beyond all limits as i
 
 
 def sizeless(names, posterior) -> set[str]:
-    """Names of which every parameter is compatible with zero, its standard deviation that of the answer.
-
-    Without any, alternatives that are so in the most probable set that contains them: they stand beside a cause.
-    """
+    """Names of which every parameter is compatible with zero, its standard deviation that of the answer."""
     best, effects = posterior.best(), posterior.setup.effects
     nominal = best.problem.view.nominal
-    named = {
+    return {
         e.name
         for e in named_effects(names, posterior, {})
         if not has_size(e.parameters, effects[e.name], best.c[e.name], nominal)
     }
-    fits = {n: next((fit for _, fit in names.fits if n in fit.names), None) for g in names.ambiguous for n in g}
-    sized = lambda n, fit: has_size(estimates_in(fit, n), effects[n], fit.c[n], nominal) or _has_a_curve(n, fit)  # noqa: E731
-    return named or {n for n, fit in fits.items() if fit is not None and not sized(n, fit)}
-
-
-def _has_a_curve(name, fit) -> bool:
-    """Whether the coefficients of an effect together differ from zero: of a free curve, no parameter is the size."""
-    mine = fit.places[name]
-    own = fit.vector[mine]
-    return bool(own @ np.linalg.pinv(fit.cov[np.ix_(mine, mine)]) @ own > DOUBT**2 * len(mine))
 
 
 def has_size(found: dict[str, Estimate], effect, c, nominal) -> bool:
