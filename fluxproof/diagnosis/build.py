@@ -42,6 +42,7 @@ def build(found: Explained, nominal: Nominal, beside: Beside | None = None) -> D
         "",
         effects=decision.effects,
         ambiguity=decision.ambiguity,
+        alternatives=decision.alternatives,
         next_recording=requested(found.planned, effects),
         location=decision.location,
         fit=decision.fit,

@@ -11,7 +11,7 @@ import pytest
 from cocotb_tests.support.recordings.slow_logs import LEVELS, NOMINAL, Truth, log
 from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.balance.slow_stretches import Stretches, message_period, stretches, stretches_in_motion
-from fluxproof.diagnosis.balance.slow_view import alike, slow_view
+from fluxproof.diagnosis.balance.slow_view import alike, slow_view, view_of_points
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.ground.machine import steady_voltage
 from fluxproof.diagnosis.ground.nominal import load_nominal
@@ -36,6 +36,17 @@ def test_stretches_span_two_messages_of_the_slowest_signal():
     recording = log()
     assert message_period(recording["t"], recording["i_q"]) == pytest.approx(0.5, abs=0.04)
     assert stretches(recording, NOMINAL).window_s >= 0.9
+
+
+def test_a_log_of_whole_messages_has_no_slow_signal():
+    """The current of an idle drive rests now and then, which is no wait for a message."""
+    rng, t = np.random.default_rng(5), 0.08 * np.arange(800)
+    noisy = np.round(rng.normal(2.0, 0.3, 800), 2)
+    idle = np.where(np.sin(0.3 * t) > 0.0, noisy, 0.0)
+    idle[1::25] = idle[::25]  # a row as the one before
+    assert message_period(t, idle) == pytest.approx(0.08)
+    assert message_period(t, np.repeat(noisy[::4], 4)) > 0.2
+    assert message_period(t, np.interp(t, t[::4], noisy[::4])) > 0.2
 
 
 def test_value_without_update_is_not_used():
@@ -130,3 +141,12 @@ def test_held_messages_are_not_balanced_in_motion():
         held = recording[name]
         recording.columns[name] = held[np.arange(len(held)) // 10 * 10]
     assert stretches_in_motion(recording, nominal) is None
+
+
+@pytest.mark.parametrize("currents, bent", [((0j, -180j), False), ((0j, -4j, -180j), False), ((0j, -90j, -180j), True)])
+def test_two_currents_show_no_bend_of_the_flux(currents, bent):
+    """Through two points any saturation is an inductance: it was named beside a drift, and certain."""
+    found = stretches(log(), NOMINAL)
+    found = replace(found, i=np.resize(np.array(currents), len(found)))
+    shown = view_of_points(found, log(), NOMINAL, CATALOGUE).visible(CATALOGUE)
+    assert ("saturation" in shown, "cross_saturation" in shown) == (bent, bent) and "inductance_q" in shown

@@ -13,7 +13,6 @@ from fluxproof.diagnosis.decide.names import Names
 from fluxproof.diagnosis.decide.relevant import relevant_names
 from fluxproof.diagnosis.decide.sized import has_size
 from fluxproof.diagnosis.ground.nominal import load_nominal
-from fluxproof.diagnosis.ground.result import NamedEffect
 
 NOMINAL = load_nominal(PAPER)
 KEYS = {"resistance": "delta_r", "magnet_flux": "delta_psi_m", "inductance_d": "delta_l_d", "inductance_q": "delta_l_q",
@@ -25,13 +24,13 @@ KEYS = {"resistance": "delta_r", "magnet_flux": "delta_psi_m", "inductance_d": "
 def test_a_name_whose_size_is_compatible_with_zero_has_none(name):
     """A coefficient of 0 +- 30 and a flux of 0.6 +- 0.5 Wb were reported; drawn over sizes and signs."""
     effect, rng = CATALOGUE[name], np.random.default_rng(sorted(KEYS).index(name))
-    for sigmas, sized in [(s, False) for s in rng.uniform(0.0, 1.9, 20)] + [
+    for sigmas, seen in [(s, False) for s in rng.uniform(0.0, 1.9, 20)] + [
         (s, True) for s in rng.uniform(2.2, 99.0, 20)
     ]:
         value = float(effect.floor(NOMINAL) * 10 ** rng.uniform(0.3, 1.5))
         c = {KEYS[name]: value if name in ("iron_loss", "machine_scale") else value * rng.choice((-1.0, 1.0))}
-        found = NamedEffect(name, 0.99, effect.estimates(c, np.diag([(value / sigmas) ** 2]), NOMINAL), 1.0)
-        assert has_size(found, effect, c, NOMINAL) is sized, (sigmas, c, found)
+        found = effect.estimates(c, np.diag([(value / sigmas) ** 2]), NOMINAL)
+        assert has_size(found, effect, c, NOMINAL) is seen, (sigmas, c, found)
 
 
 @pytest.mark.parametrize("name", sorted(KEYS))

@@ -8,6 +8,7 @@ linearisation, or on that of another set.  The effects e and f are measurement e
 from __future__ import annotations
 
 import importlib
+from types import SimpleNamespace
 
 import pytest
 
@@ -76,6 +77,26 @@ def test_the_best_set_stands(monkeypatch):
     assert best.stands and best.c["a"]["x"] == pytest.approx(1.0, abs=2e-3)
     monkeypatch.setattr(moves, "LAST", [move for move in moves.LAST if move.__name__ != "stand"])
     assert not table.found().stands
+
+
+class Led:
+    """Twelve sets that lead on the linearisation of another one, and lose by their own; one that stands below them."""
+
+    def __init__(self):
+        self.fits = {(n,): SimpleNamespace(names=(n,), value=100.0, stands=False) for n in "abcdefghijkl"}
+        self.fits["z",] = SimpleNamespace(names=("z",), value=50.0, stands=True)
+
+    def best(self):
+        return max(self.fits.values(), key=lambda fit: fit.value)
+
+    def linearise(self, names, steps):
+        self.fits[names] = SimpleNamespace(names=names, value=-10.0, stands=False)
+
+
+def test_what_leads_on_the_linearisation_of_another_set_loses_one_after_another():
+    led = Led()
+    moves.stand(led, led.best().names)
+    assert led.best().names == ("z",)
 
 
 def test_every_move_has_a_case():

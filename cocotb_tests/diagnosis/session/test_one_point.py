@@ -45,6 +45,11 @@ def test_a_constant_misfit_at_one_point_is_an_ambiguity(tmp_path):
     assert {"magnet_flux", "udc_gain"} <= set(answer.ambiguity[-1]) and said(answer, "one point cannot show why")
     assert answer.fit.train_before == pytest.approx(2.63, abs=0.02) and answer.explained_share > 0.99
     assert answer.fit.train_after < answer.fit.noise_floor and answer.fit.holdout_after < answer.fit.noise_floor
+    sizes = {e.name: e.parameters for e in answer.alternatives}
+    assert sizes.keys() == set(answer.ambiguity[-1]) and "magnet flux off the nameplate: flux linkage" in answer.details
+    flux, gain = sizes["magnet_flux"]["magnet_flux_wb"], sizes["udc_gain"]["udc_gain"]
+    assert abs(flux.value - 1.044 * PSI) < 0.01 * PSI and abs(gain.value - 0.04) < 0.01
+    assert len(answer.next_recording) == 3
     two_rows = answer_of(tmp_path, table(WEAK, points=[(300.0, 0.0, 4.0)] * 2))
     assert two_rows.fit.train_before > 2.0 > two_rows.fit.train_after
     assert two_rows.verdict == "ambiguous" and "magnet_flux" in two_rows.ambiguity[0]

@@ -35,6 +35,7 @@ REST = 1e-3  # of a signal's largest value: a smaller signal is at rest and need
 FEW_TURNS = 1.5  # the same in a log without messages, whose stretches are shorter
 TURNS = 4.0  # electrical turns within a stretch: the inverter loss depends on the angle, its mean over turns does not
 RESTED = 6.0  # times the median time between changes: after a longer time the signal counts as constant
+EVERY_ROW = 0.75  # of the rows: between every one, and every second one, which a held or interpolated signal changes in
 USUAL = 0.9  # quantile of the other intervals
 CONTROL = 2e-3  # s: a control samples as often
 GAP = 10.0  # times the usual step
@@ -298,11 +299,22 @@ def operating_columns(recording: Recording, nominal):
 
 
 def message_period(t, x) -> float:
-    """Typical longest time between two messages of a signal [s], from its changes; interpolation counts once."""
-    apart = _between_changes(t, x) if np.isfinite(x).any() else ()
+    """Typical longest time between two messages of a signal [s], from its changes; interpolation counts once.
+
+    Of a signal that changes in nearly every row, each row is a message: its few longer intervals are rests.
+    """
+    apart = _between_changes(t, x) if np.isfinite(x).any() and not _is_in_every_row(x) else ()
     if len(apart) < 4:
         return float(np.median(np.diff(t)))
     return float(np.quantile(apart[apart < RESTED * np.median(apart)], USUAL))
+
+
+def _is_in_every_row(x) -> bool:
+    """Whether a signal, where it is not at rest, neither holds a value nor is interpolated over two rows or more."""
+    largest = np.nanmax(np.abs(x))
+    active = np.abs(x) > REST * largest
+    moves, bends = (np.abs(np.diff(x, n)) > 1e-9 * largest for n in (1, 2))
+    return bool(active[2:].any() and min(moves[active[1:]].mean(), bends[active[2:]].mean()) > EVERY_ROW)
 
 
 def restless(t, x) -> bool:

@@ -6,14 +6,14 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.decide.decision import IMITATION, INSIGNIFICANT, NOISE, Basis, Decision, Withheld
-from fluxproof.diagnosis.decide.estimates import named_effects
+from fluxproof.diagnosis.decide.estimates import estimates_in, named_effects
 from fluxproof.diagnosis.decide.likeliest import likeliest
 from fluxproof.diagnosis.decide.locate import evidence, locate
 from fluxproof.diagnosis.decide.off_orders import Stray
 from fluxproof.diagnosis.decide.rules import Judgement, judge
 from fluxproof.diagnosis.decide.sizes import Sizes, fit_of, left_by, measured_torque, with_stray
 from fluxproof.diagnosis.decide.unknown_term import sparse_term
-from fluxproof.diagnosis.ground.result import Fit, Remainder, UnknownTerm
+from fluxproof.diagnosis.ground.result import Fit, NamedEffect, Remainder, UnknownTerm
 from fluxproof.diagnosis.inference.fitted_set import covariance_of
 
 MOST_RIVALS = 5
@@ -32,6 +32,7 @@ def conclude(posterior, held) -> Decision:
         j.kind,
         effects=tuple(named_effects(j.names, j.posterior, shares)),
         ambiguity=j.names.ambiguous,
+        alternatives=_alternatives(j),
         withheld=_withheld(j, shares),
         location=locate(view, cells, setup.noise),
         fit=_fit(j, held, explained),
@@ -82,6 +83,16 @@ def _rivals(names) -> tuple:
             seen.add(mine)
             rivals.append(fit)
     return tuple(rivals[:MOST_RIVALS])
+
+
+def _alternatives(j: Judgement) -> tuple[NamedEffect, ...]:
+    """Every effect of an ambiguity with its sizes in the most probable set that contains it."""
+    present, out = j.posterior.present(), []
+    for name in sorted({n for group in j.names.ambiguous for n in group}):
+        fit = next((fit for _, fit in j.names.fits if name in fit.names), None)
+        if fit is not None:
+            out.append(NamedEffect(name, float(min(present.get(name, 0.0), 0.999)), estimates_in(fit, name), 0.0))
+    return tuple(out)
 
 
 def _shares(j: Judgement, held) -> dict[str, float]:

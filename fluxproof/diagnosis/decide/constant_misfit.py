@@ -1,13 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The misfit of a single operating point that stays the same over time, and the effects that explain it alone."""
+"""The misfit of a single operating point that stays the same over time, and the effects that explain it alone.
+
+The voltage that stays is two numbers, so that every effect with a column near their direction explains it with some
+size.  A measurement error is far from linear, so that its size is found by steps, each on the corrected data.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.balance.cells import voltage_level
+from fluxproof.diagnosis.balance.cells import cells_of, voltage_level
 from fluxproof.diagnosis.balance.orders import at_order
+from fluxproof.diagnosis.effects import MeasurementError, is_usual
 from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.ground.result import NamedEffect
+
+STEPS = 8  # of a measurement error; each leaves a fraction of the last one's change
 
 
 def resolution(view) -> float:
@@ -15,20 +23,45 @@ def resolution(view) -> float:
     return k.CONSTANT_DC * view.nominal.inverter.dc_bus_v + k.CONSTANT_U * float(voltage_level(view).mean())
 
 
-def explaining(view, cells, effects, drifting, constant) -> list[str]:
-    """Effects that do not drift and explain the constant misfit alone, with a size that a drive can have."""
-    out, limit = [], resolution(view)
-    for name, effect in effects.items():
-        cores = {key: v for key, v in cells.columns[name].items() if (name, key) not in cells.free}
-        if name in drifting or not cores:
-            continue
-        means = {key: complex(np.nanmean(at_order(cells, v, 0.0))) for key, v in cores.items()}
-        most = max(means, key=lambda key: abs(means[key]))
-        if abs(means[most]) < 1e-9:
-            continue
-        value = (np.conj(means[most]) * constant).real / abs(means[most]) ** 2
-        c = {key: value if key == most else 0.0 for key in cores}
-        close = abs(constant - value * means[most]) < k.FITS * limit
-        if close and effect.possible(c, np.zeros((len(c),) * 2), view.nominal) and not effect.too_large(c, view):
-            out.append(name)
-    return sorted(out)
+def explaining(view, cells, effects, drifting, constant) -> tuple[NamedEffect, ...]:
+    """Effects that do not drift and explain the constant misfit alone, with the size that each then has.
+
+    None of a size that no drive has; of implausible sizes only if no other effect explains it.
+    """
+    found = [(_alone(view, cells, name, effects[name], constant), effects[name]) for name in sorted(effects)
+             if name not in drifting]  # fmt: skip
+    able = [(one, effect) for one, effect in found if one is not None]
+    usual = [one for one, effect in able if is_usual(one.parameters, effect.plausible, view.nominal)]
+    return tuple(usual or [one for one, _ in able])
+
+
+def _alone(view, cells, name, effect, constant) -> NamedEffect | None:
+    """One effect with the size that explains the constant misfit, None if it leaves more than the resolution."""
+    keys = [key for key in cells.columns[name] if (name, key) not in cells.free]
+    tried = [_by(view, cells, (name, key), effect, constant) for key in keys]
+    return min((one for one in tried if one is not None), key=lambda one: -one.explains, default=None)
+
+
+def _by(view, cells, at, effect, constant) -> NamedEffect | None:
+    """The same by one coefficient of it, ``at`` = (effect, coefficient)."""
+    name, key = at
+    c = dict.fromkeys((other for other in cells.columns[name] if (name, other) not in cells.free), 0.0)
+    moves, left, per_unit = isinstance(effect, MeasurementError), constant, 0.0
+    for _ in range(STEPS if moves else 1):
+        mean = complex(np.nanmean(at_order(cells, cells.columns[name][key], 0.0)))
+        per_unit = abs(mean)
+        if per_unit < 1e-9:
+            return None
+        step = (np.conj(mean) * left).real / per_unit**2
+        c[key], left = c[key] + step, left - step * mean
+        if effect.too_large(c, view):
+            return None
+        if moves:
+            cells = cells_of(effect.corrected(view, c), [effect])
+            left = complex(np.nanmean(at_order(cells, cells.y, 0.0)))
+    limit = resolution(view)
+    if abs(left) >= k.FITS * limit or not effect.possible(c, np.zeros((len(c),) * 2), view.nominal):
+        return None
+    covariance = np.diag([(limit / per_unit) ** 2 if other == key else 0.0 for other in c])
+    share = float(np.clip(1.0 - abs(left / constant) ** 2, 0.0, 1.0))
+    return NamedEffect(name, 0.5, effect.estimates(c, covariance, view.nominal), share)

@@ -85,6 +85,7 @@ class Decision:
     verdict: str
     effects: tuple[NamedEffect, ...] = ()
     ambiguity: tuple[tuple[str, ...], ...] = ()
+    alternatives: tuple[NamedEffect, ...] = ()
     withheld: tuple[Withheld, ...] = ()
     location: Location = Location()
     fit: Fit = Fit()

@@ -50,17 +50,19 @@ def conclude_one_point(view) -> Decision:
     best, tied = best_sets(fitter, effects, drifting, view)
     constant = complex(np.nanmean(raw - fitted(cells, best)))
     off = abs(constant) > resolution(view)
-    point = OnePoint(constant, off, tuple(explaining(view, cells, effects, drifting, constant)), long)
+    alone = explaining(view, cells, effects, drifting, constant) if off else ()
+    point = OnePoint(constant, off, tuple(e.name for e in alone), long)
     drift = _fit(cells, centred.y, best.residual, sigma, held) if long else _spread(raw - constant * off, sigma)
     drifted, open_ = _sorted_out(best, tied, effects, view)
     wider = fuller(fitter, best, effects, drifting, view) + with_copper(fitter, best, cells, view)
     named = {n: _named(n, effects[n], best, wider, fitter, view) for n in drifted}
-    sized = tuple(n for n in drifted if has_size(named[n], effects[n], best.c[n], view.nominal))
+    sized = tuple(n for n in drifted if has_size(named[n].parameters, effects[n], best.c[n], view.nominal))
     names, groups, beside, kind, fit = _ruled((sized, open_), best, drift, point, view)
     return Decision(
         kind,
         effects=tuple(named[n] for n in names),
         ambiguity=groups,
+        alternatives=tuple(e for e in alone if any(e.name in g for g in groups)),
         withheld=(
             *(Withheld(n, CONSTANT) for n in beside),
             *(Withheld(n, SIZELESS) for n in drifted if n not in sized),

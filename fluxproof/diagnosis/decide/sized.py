@@ -13,7 +13,7 @@ import numpy as np
 
 from fluxproof.diagnosis.decide.estimates import named_effects
 from fluxproof.diagnosis.effects import DOUBT
-from fluxproof.diagnosis.ground.result import Estimate, NamedEffect
+from fluxproof.diagnosis.ground.result import Estimate
 
 VANISHES = 1e6  # times the value: a parameter that grows beyond all limits as its effect vanishes, as a resistance
 
@@ -23,17 +23,19 @@ def sizeless(names, posterior) -> set[str]:
     best, effects = posterior.best(), posterior.setup.effects
     nominal = best.problem.view.nominal
     return {
-        e.name for e in named_effects(names, posterior, {}) if not has_size(e, effects[e.name], best.c[e.name], nominal)
+        e.name
+        for e in named_effects(names, posterior, {})
+        if not has_size(e.parameters, effects[e.name], best.c[e.name], nominal)
     }
 
 
-def has_size(found: NamedEffect, effect, c, nominal) -> bool:
+def has_size(found: dict[str, Estimate], effect, c, nominal) -> bool:
     """Whether a parameter of an effect differs from what it is without the effect by more than its uncertainty.
 
-    c: {coefficient: value}, of which all are zero without it.
+    found: {parameter: Estimate}; c: {coefficient: value}, of which all are zero without it.
     """
     absent = effect.estimates(dict.fromkeys(c, 0.0), np.zeros((len(c),) * 2), nominal)
-    return any(_differs(e, absent[key].value if key in absent else 0.0) for key, e in found.parameters.items())
+    return any(_differs(e, absent[key].value if key in absent else 0.0) for key, e in found.items())
 
 
 def _differs(e: Estimate, absent: float) -> bool:

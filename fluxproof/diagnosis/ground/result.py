@@ -243,6 +243,7 @@ class Diagnosis:
     unknown_term: UnknownTerm | None = None
     best_fit: BestFit | None = None  # of an unexplained misfit
     minor: tuple[NamedEffect, ...] = ()  # found, and too small to act on
+    alternatives: tuple[NamedEffect, ...] = ()  # the effects of the ambiguities, each as it is if it is the one
     rows: int = 0
     problems: tuple[Problem, ...] = ()
     digital: Digital = Digital()

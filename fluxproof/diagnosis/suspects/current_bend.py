@@ -66,6 +66,8 @@ EFFECT = CurrentBend(
     equation="i_measured = i + b i^3, b of each phase",
     signature="a sum of the phase currents that follows their third power; order 0 as for a saturation, and order 6",
     separated_by="a second current sensor at full scale; the sum of three measured currents",
+    plausible={"bend": (-0.25, 0.25)},  # beyond it a sensor clips, which a check finds
+    otherwise="the sensors clip",
     parameters=(Parameter("bend", "1", "relative error at rated current of the worst phase", "bend"),),
     needs=("harmonics", "current"),
     shows_at=Orders((0.0, 2.0, 6.0)),

@@ -46,6 +46,8 @@ EFFECT = CurrentGainDrift(
     equation="i_measured = (1 + s t) i, with t from 0 to 1 over the recording",
     signature="R, L_d and L_q drift by the same factor",
     separated_by="the same operating point at the start and at the end",
+    plausible={"drift": (-0.03, 0.03)},  # a shunt or a Hall sensor that warms by 100 K
+    otherwise="the machine warms, or another range of the sensors was chosen",
     parameters=(Parameter("drift", "1", "change of the gain over the recording"),),
     needs=("current", "time"),
 )

@@ -37,6 +37,8 @@ EFFECT = LegVoltage(
     equation="u = u_recorded - e_abc, constant in the stator frame",
     signature="order 1 in dq, the same at every speed and current",
     separated_by="two speeds: offsets of the sensors also appear proportional to the speed",
+    plausible={"volts": (0.0, 0.03, "inverter.dc_bus_v")},  # as a dead time: legs differ by less than a loss
+    otherwise="a gate driver is broken, or a sensor has an offset",
     parameters=(Parameter("volts", "V", "difference of the legs", "difference"),),
     needs=("harmonics", "inverter"),
     shows_at=Orders((1.0,)),

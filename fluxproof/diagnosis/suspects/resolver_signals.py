@@ -47,6 +47,8 @@ EFFECT = ResolverSignals(
     equation="theta_measured = theta_e + a sin(2 theta_e) + b cos(2 theta_e)",
     signature="orders 2 and -2, proportional to speed, without current too",
     separated_by="rotation at zero current at two speeds; amplitudes of sine and cosine over a turn",
+    plausible={"amplitude_rad": (0.0, 0.1)},  # signals that differ by a fifth
+    otherwise="the rotor is eccentric",
     parameters=(Parameter("amplitude_rad", "rad", "electrical, twice per electrical turn", "amplitude"),),
     needs=("harmonics", "angle"),
     shows_at=Orders((2.0, -2.0)),

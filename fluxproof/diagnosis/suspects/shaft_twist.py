@@ -39,6 +39,8 @@ EFFECT = ShaftTwist(
     equation="theta_measured = theta_e + k T",
     signature="order 0: omega psi_m k T on the d axis, odd in i_q: like an error of L_q with a cross-saturation",
     separated_by="i_d of both signs at one torque; the angle against a second sensor, loaded and unloaded",
+    plausible={"twist_rad": (-0.1, 0.1)},  # some degrees of the shaft: a coupling that turns further is broken
+    otherwise="a coupling that turns further is broken, or an axis saturates",
     parameters=(Parameter("twist_rad", "rad", "electrical, at rated torque", "twist"),),
     needs=("angle",),
 )

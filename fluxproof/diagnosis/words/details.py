@@ -27,6 +27,8 @@ def details(answer, sentence, effects) -> str:
     if answer.effects and full != sentence:
         parts.append(full)
     volts = lambda x: ascii_of(quantity(x, fit.unit, 3))  # noqa: E731
+    if answer.alternatives:
+        parts.append(f"If it is one alone: {'; '.join(said(e, effects) for e in answer.alternatives)}.")
     if fit.holdout_before > 0.0:
         both = f"falls from {volts(fit.holdout_before)} to {volts(fit.holdout_after)}"
         found = bool(answer.effects or answer.ambiguity or answer.conventions)

@@ -32,8 +32,7 @@ def _of_constant(found: OnePoint) -> str:
             "cancel at this point cannot be detected."
         )
     c = found.constant
-    what = f" (each of {', '.join(found.candidates)} could)" if found.candidates else ""
     return (
         f"At the start the voltage differs by {c.real:.3g} V on the d axis and {c.imag:.3g} V on the q axis; one point "
-        f"cannot show why{what}: record more speeds and currents."
+        "cannot show why: record more speeds and currents."
     )
