@@ -95,6 +95,6 @@ module formal_top (
     if (was_ended && ring_ended && marked && row + `RING_ROWS >= rows && address == (row * `ROW_WORDS + place) % DEPTH)
       assert (ring_data == {31'd0, value});
     cover (was_ended && ring_full && marked && row + `RING_ROWS == rows && row != 0);
-    cover (ring_ended && !ring_full && rows == 2);
+    cover (ring_ended && !ring_full && rows == 1);
   end
 endmodule
