@@ -91,12 +91,12 @@ class Live:
         cuts = np.flatnonzero(step != 1).tolist()
         if self.last is None:
             self.replay.cut(bool(numbers[0] == 0))
-        for start, stop in zip([0, *cuts], [*cuts, len(rows)], strict=True):
+        starts = sorted({0, *cuts})
+        for start, stop in zip(starts, [*starts[1:], len(rows)], strict=True):
             if start in cuts:
                 self._cut(int(step[start]), int(numbers[start]))
-            if start < stop:
-                part = {name: column[start:stop] for name, column in fields.items()}
-                self.replay.take(numbers[start:stop], part)
+            part = {name: column[start:stop] for name, column in fields.items()}
+            self.replay.take(numbers[start:stop], part)
         self._note_gates(numbers, fields["run"])
         self.last = int(numbers[-1])
         with self.lock:

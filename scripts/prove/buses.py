@@ -158,10 +158,10 @@ PROOFS = (
             ),
         ),
         method="bmc",
-        depth=20,  # three rows, the end, a look; beyond, the solvers take too long
+        depth=17,  # three rows, the end, a look; beyond, the solvers take too long
         generics={"RING_ROWS": 2, "ROW_WORDS": 2},
         assumed="a ring of 2 rows of 2 words of 1 bit, up to 1 row after a write that stops it",
-        search_depth=22,
+        search_depth=17,
         patience=300,
     ),
 )
