@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """``fluxproof watch SOURCE --drive drive.toml``: see the drive, and read why it differs, while it runs.
 
-SOURCE is a capture that grows, or tcp://HOST:PORT of docs/software/telemetry_server.c.
+SOURCE is a capture that grows, tcp://HOST:PORT of docs/software/telemetry_server.c, or ``verilator``: the core itself,
+simulated, in a clone.
 """
 
 from __future__ import annotations
@@ -17,12 +18,13 @@ from fluxproof.quote import put, say
 from golden_model.board_registers import board_set
 from golden_model.drive_keys import DriveError
 
+VERILATOR = "verilator"
 MOST_ROWS = 2_000_000  # 200 MB
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Options of the subcommand."""
-    parser.add_argument("source", metavar="SOURCE", help="a growing file of packets, or tcp://HOST:PORT")
+    parser.add_argument("source", metavar="SOURCE", help="a growing file of packets, tcp://HOST:PORT, or verilator")
     parser.add_argument(
         "--drive", metavar="drive.toml", required=True, help="the drive that the core was configured for"
     )
@@ -57,7 +59,12 @@ def run(args: argparse.Namespace) -> int:
     rows = round(args.keep / drive.sample_time_s)
     if not 2 <= rows <= MOST_ROWS:
         raise DriveError(f"--keep {args.keep:g}: expected up to {MOST_ROWS * drive.sample_time_s:.0f} s")
-    source = source_of(args.source)
+    if args.source == VERILATOR:
+        from fluxproof.watch.verilated import Verilated
+
+        source = Verilated(drive, register_set)
+    else:
+        source = source_of(args.source)
     sinks = [Csv(args.csv, drive)] if args.csv else []
     sinks += [PlotJuggler(args.plotjuggler, drive)] if args.plotjuggler else []
     live = Live(source, rows, LiveReplay(register_set), sinks)
