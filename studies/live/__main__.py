@@ -92,6 +92,8 @@ def watch(rows: np.ndarray, rate: float) -> dict:
         command += ["--drive", str(DRIVE_FILE), "--port", "0", "--every", "0", "--seconds", str(seconds + 6.0)]
         child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         url = child.stderr.readline()
+        if "http://" not in url:
+            raise RuntimeError(f"watch said {url!r} instead of the page's address")
         with deaf_browser(url):
             memory = []
             for _ in range(2):
