@@ -81,7 +81,7 @@ def deaf_browser(url: str) -> socket.socket:
 
 
 def watch(rows: np.ndarray, rate: float) -> dict:
-    """One run: what watch says at its end, its memory at a third of the run and at the end."""
+    """One run: what watch says at its end, its memory in the middle of the run and at the end."""
     with socket.socket() as server:
         server.bind(("127.0.0.1", 0))
         server.listen(1)
@@ -90,8 +90,8 @@ def watch(rows: np.ndarray, rate: float) -> dict:
         thread.start()
         command = [sys.executable, "-m", "fluxproof", "watch", f"tcp://127.0.0.1:{server.getsockname()[1]}"]
         command += ["--drive", str(DRIVE_FILE), "--port", "0", "--every", "0", "--seconds", str(seconds + 6.0)]
-        child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        url = child.stderr.readline()
+        child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        url = child.stdout.readline()
         if "http://" not in url:
             raise RuntimeError(f"watch said {url!r} instead of the page's address")
         with deaf_browser(url):
