@@ -7,6 +7,7 @@ The reader waits for nobody: it holds the lock while it copies rows in, a look w
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
@@ -20,6 +21,7 @@ from fluxproof.watch.source import Source
 from golden_model.io.telemetry_words import COUNT, COUNTER, FIELDS, LAYOUT
 
 MOST_EVENTS = 50
+DRAIN_S = 1.0
 
 
 class Sink(Protocol):
@@ -65,6 +67,9 @@ class Live:
         try:
             while not self.ending.is_set():
                 self.pump()
+            end = time.monotonic() + DRAIN_S  # what came before the end still counts
+            while self.pump() and time.monotonic() < end:
+                pass
         except Exception as error:
             self.failure = error
         finally:
