@@ -52,9 +52,9 @@ class Csv:
 
     def take(self, counter: np.ndarray, fields: dict[str, np.ndarray]) -> None:
         rows = table(counter, fields, self.scales, self.period_s)
-        if self.writer is None:
-            self.writer = CSVWriter(self.file, rows.schema)
-        self.writer.write(rows)
+        writer = self.writer or CSVWriter(self.file, rows.schema)
+        writer.write(rows)
+        self.writer = writer
 
     def close(self) -> None:
         if self.writer is not None:

@@ -64,7 +64,7 @@ class Verilated:
             inputs = plant.inputs(k)
             got = run_now(device.period(inputs, int(scenario.enable[k])))
             plant.advance(k, got.edge_clocks * (plant.period_s / got.clocks), got.gate_words)
-            sample = fluxproof.Sample(*(inputs[name] for name in INPUT_PORTS), got.running)
+            sample = fluxproof.Sample._make((*(inputs[name] for name in INPUT_PORTS), got.running))
             words = pack(k, sample._asdict() | {name: got.observed[name] for name in PACKET})
             self._give(np.array(words, "<u4").tobytes())
             if self.ending.is_set():

@@ -91,6 +91,7 @@ def watch(rows: np.ndarray, rate: float) -> dict:
         command = [sys.executable, "-m", "fluxproof", "watch", f"tcp://127.0.0.1:{server.getsockname()[1]}"]
         command += ["--drive", str(DRIVE_FILE), "--port", "0", "--every", "0", "--seconds", str(seconds + 10.0)]
         child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        assert child.stdout is not None  # a pipe, see above
         url = child.stdout.readline()
         if "http://" not in url:
             raise RuntimeError(f"watch said {url!r} instead of the page's address")
