@@ -26,7 +26,7 @@ unexport PYTHONHOME
 
 PYTHON_RUN := .venv/bin/python
 
-.PHONY: help setup generate test slow demo papers hil speed bench blind fleet sensitivity real mishaps brought compare timeline mutate verilog synth ecp5 lint registers package prove faults rough board fuzz lock clean distclean
+.PHONY: help setup generate test slow demo papers hil speed bench blind fleet sensitivity real mishaps brought compare timeline live mutate verilog synth ecp5 lint registers package prove faults rough board fuzz lock clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -88,6 +88,9 @@ compare: setup ## diagnose the same cases with alternative methods
 
 timeline: setup ## draw the timeline of one control period
 	$(PYTHON_RUN) -m studies.timeline $(ARGS)
+
+live: setup ## does watch keep up with 10 and 20 kHz (ARGS='--seconds 300')
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.live $(ARGS)
 
 board: setup ## measure the figures of encoders, converters and the closed loop of a board
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.board $(ARGS)

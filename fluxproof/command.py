@@ -40,6 +40,7 @@ COMMANDS = {
     "project": Command("fluxproof.project.command", "the files of a Vivado project for a drive"),
     "registers": Command("fluxproof.print_registers", "the registers for a drive"),
     "simulate": Command("fluxproof.simulate.command", "a drive in closed loop with the golden core: does it work"),
+    "watch": Command("fluxproof.watch.command", "a running drive on a page, and why it differs, while it runs"),
 }
 
 

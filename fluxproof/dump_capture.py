@@ -11,6 +11,8 @@ import argparse
 import json
 from pathlib import Path
 
+from fluxproof.commission.bus import BusError, UioBus
+from fluxproof.commission.ring import read_ring
 from fluxproof.diagnosis.whole_drive import load_drive
 from fluxproof.files import refuse_overwriting
 from fluxproof.quote import put, say
@@ -43,13 +45,18 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--piece", type=int, metavar="N", help="which piece of a capture with a reset inside, from 1 on"
     )
+    parser.add_argument(
+        "--ring", action="store_true", help="capture.bin is /dev/uioN: read the rows that the core's ring kept"
+    )
     parser.add_argument("-o", "--out", metavar="FILE", help="the dump (default: the capture's name with .fluxdump)")
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the dump and print its contents; returns 0."""
-    from fluxproof.diagnosis.replay.telemetry_stream import read_capture, write_piece  # takes a second to import
+    from fluxproof.diagnosis.replay.telemetry_stream import parse, read_capture, write_piece  # takes a second to import
 
+    if args.ring and not args.out:
+        raise DriveError("--ring: the dump needs a name: -o run.fluxdump")
     out = Path(args.out) if args.out else Path(args.capture).with_suffix(".fluxdump")
     refuse_overwriting([out], [args.capture, args.drive, args.registers])
     drive = load_drive(args.drive)
@@ -59,13 +66,21 @@ def run(args: argparse.Namespace) -> int:
         raise DriveError(f"{args.drive}: {error}") from None
     if args.registers:
         register_set = with_registers(register_set, Path(args.registers))
-    capture = read_capture(args.capture)
+    capture = parse(ring_of(args.capture), args.capture) if args.ring else read_capture(args.capture)
     number = chosen(capture.pieces, args.piece, args.capture)
     with alone(out) as file:
         write_piece(file, capture.pieces[number], drive, register_set)
     put("\n".join(summary(capture, number)))
     say(f"wrote {out}")
     return 0
+
+
+def ring_of(path: str) -> bytes:
+    """The rows in the ring of the core behind /dev/uioN."""
+    try:
+        return read_ring(UioBus(path))
+    except BusError as error:
+        raise DriveError(f"{path}: {error}") from None
 
 
 def chosen(pieces, wanted: int | None, name) -> int:

@@ -32,7 +32,7 @@ from scripts.registers import export, generated, rdl, vhdl
 from scripts.registers.compiled import compile_file, words
 
 MAP = register_map.registers()
-BESIDE_THE_CORE = ("telemetry", "irq_")  # names of registers that the core does not see
+BESIDE_THE_CORE = ("telemetry", "irq_", "ring_")  # names of registers that the core does not see
 WHOLE = board_map.registers()  # with the second block of addresses, that of a board
 
 

@@ -851,6 +851,83 @@ extern "C" {
 #define FLUXPROOF__TORQUE_STEP__VALUE_bw 32
 #define FLUXPROOF__TORQUE_STEP__VALUE_reset 0x0
 
+// reg - fluxproof::ring_arm
+#define FLUXPROOF__RING_ARM__VALUE_bm 0x1
+#define FLUXPROOF__RING_ARM__VALUE_bp 0
+#define FLUXPROOF__RING_ARM__VALUE_bw 1
+#define FLUXPROOF__RING_ARM__VALUE_reset 0x0
+
+// reg - fluxproof::ring_stop
+#define FLUXPROOF__RING_STOP__VALUE_bm 0x1
+#define FLUXPROOF__RING_STOP__VALUE_bp 0
+#define FLUXPROOF__RING_STOP__VALUE_bw 1
+#define FLUXPROOF__RING_STOP__VALUE_reset 0x0
+
+// reg - fluxproof::ring_faults
+#define FLUXPROOF__RING_FAULTS__VALUE_bm 0x1ffff
+#define FLUXPROOF__RING_FAULTS__VALUE_bp 0
+#define FLUXPROOF__RING_FAULTS__VALUE_bw 17
+#define FLUXPROOF__RING_FAULTS__VALUE_reset 0x0
+
+// reg - fluxproof::ring_word
+#define FLUXPROOF__RING_WORD__VALUE_bm 0x1f
+#define FLUXPROOF__RING_WORD__VALUE_bp 0
+#define FLUXPROOF__RING_WORD__VALUE_bw 5
+#define FLUXPROOF__RING_WORD__VALUE_reset 0x0
+
+// reg - fluxproof::ring_high
+#define FLUXPROOF__RING_HIGH__VALUE_bm 0xffffffff
+#define FLUXPROOF__RING_HIGH__VALUE_bp 0
+#define FLUXPROOF__RING_HIGH__VALUE_bw 32
+#define FLUXPROOF__RING_HIGH__VALUE_reset 0x0
+
+// reg - fluxproof::ring_low
+#define FLUXPROOF__RING_LOW__VALUE_bm 0xffffffff
+#define FLUXPROOF__RING_LOW__VALUE_bp 0
+#define FLUXPROOF__RING_LOW__VALUE_bw 32
+#define FLUXPROOF__RING_LOW__VALUE_reset 0x0
+
+// reg - fluxproof::ring_after
+#define FLUXPROOF__RING_AFTER__VALUE_bm 0xfff
+#define FLUXPROOF__RING_AFTER__VALUE_bp 0
+#define FLUXPROOF__RING_AFTER__VALUE_bw 12
+#define FLUXPROOF__RING_AFTER__VALUE_reset 0x0
+
+// reg - fluxproof::ring_address
+#define FLUXPROOF__RING_ADDRESS__VALUE_bm 0xffff
+#define FLUXPROOF__RING_ADDRESS__VALUE_bp 0
+#define FLUXPROOF__RING_ADDRESS__VALUE_bw 16
+#define FLUXPROOF__RING_ADDRESS__VALUE_reset 0x0
+
+// reg - fluxproof::ring_state
+#define FLUXPROOF__RING_STATE__RING_RECORDING_bm 0x1
+#define FLUXPROOF__RING_STATE__RING_RECORDING_bp 0
+#define FLUXPROOF__RING_STATE__RING_RECORDING_bw 1
+#define FLUXPROOF__RING_STATE__RING_ENDED_bm 0x2
+#define FLUXPROOF__RING_STATE__RING_ENDED_bp 1
+#define FLUXPROOF__RING_STATE__RING_ENDED_bw 1
+#define FLUXPROOF__RING_STATE__RING_FULL_bm 0x4
+#define FLUXPROOF__RING_STATE__RING_FULL_bp 2
+#define FLUXPROOF__RING_STATE__RING_FULL_bw 1
+#define FLUXPROOF__RING_STATE__RING_CAUSE_bm 0xf0
+#define FLUXPROOF__RING_STATE__RING_CAUSE_bp 4
+#define FLUXPROOF__RING_STATE__RING_CAUSE_bw 4
+
+// reg - fluxproof::ring_depth
+#define FLUXPROOF__RING_DEPTH__VALUE_bm 0xfff
+#define FLUXPROOF__RING_DEPTH__VALUE_bp 0
+#define FLUXPROOF__RING_DEPTH__VALUE_bw 12
+
+// reg - fluxproof::ring_next
+#define FLUXPROOF__RING_NEXT__VALUE_bm 0xffff
+#define FLUXPROOF__RING_NEXT__VALUE_bp 0
+#define FLUXPROOF__RING_NEXT__VALUE_bw 16
+
+// reg - fluxproof::ring_data
+#define FLUXPROOF__RING_DATA__VALUE_bm 0xffffffff
+#define FLUXPROOF__RING_DATA__VALUE_bp 0
+#define FLUXPROOF__RING_DATA__VALUE_bw 32
+
 // reg - fluxproof::encoder
 #define FLUXPROOF__ENCODER__VALUE_bm 0xffffffff
 #define FLUXPROOF__ENCODER__VALUE_bp 0
@@ -1474,7 +1551,20 @@ typedef struct {
     uint32_t table_word;
     uint32_t v_start;
     uint32_t torque_step;
-    uint8_t RESERVED_278_3ff[0x188];
+    uint8_t RESERVED_278_3bf[0x148];
+    uint32_t ring_arm;
+    uint32_t ring_stop;
+    uint32_t ring_faults;
+    uint32_t ring_word;
+    uint32_t ring_high;
+    uint32_t ring_low;
+    uint32_t ring_after;
+    uint32_t ring_address;
+    uint32_t ring_state;
+    uint32_t ring_depth;
+    uint32_t ring_next;
+    uint32_t ring_data;
+    uint8_t RESERVED_3f0_3ff[0x10];
     uint32_t encoder;
     uint32_t currents;
     uint32_t spi_lines;

@@ -9,7 +9,7 @@ t is the time since the last edge, T that of the last sector, d = 1 or -1 the di
     else, the speed is not known:                          place = (t/T - 1)/2 up to t = T,  then 0
 
 So the angle passes from one edge to the next where the speed is constant, goes back to the middle where the next edge
-is late, and is the middle at rest.  After a reversal the shaft is at the edge it has passed before: the angle goes on from
+is late, and is the middle at rest.  After a reversal the shaft is at the edge it has passed: the angle goes on from
 this edge, towards the middle.  There T is the longer one of the last sector and the time since the edge before, a
 quarter of the longest time at most; as long an edge after a rest may take.  Before the first edge, and after a change
 by more than one sector, the angle is the middle.

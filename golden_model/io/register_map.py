@@ -26,7 +26,7 @@ from golden_model import fluxproof
 from golden_model.block import Port
 from golden_model.fixed import Format
 from golden_model.formats import BIT
-from golden_model.io import fault_latch, interrupts, sample_guard, sample_latch, telemetry
+from golden_model.io import fault_latch, interrupts, sample_guard, sample_latch, telemetry, telemetry_ring
 from golden_model.modulation import gate_generation
 
 ADDRESS_BITS, WORDS = 12, 256  # the slave decodes 4 KiB; the registers are in the first WORDS words
@@ -111,7 +111,7 @@ _SETTINGS = """
     240 double_update
     250 use_table     254 k_flux         258 u_share      25c k_voltage      260 share_min    264 k_torque
     268 omega_learn   26c table_word     270 v_start        274 torque_step
-"""  # 23c, 244 to 24c and 278 to 3fc are free
+"""  # 23c, 244 to 24c and 278 to 3bc and 3f0 to 3fc are free
 _COMMANDS = {
     "enable": (0x040, Kind.COMMAND),
     "clear_trip": (0x044, Kind.PULSE),
@@ -125,6 +125,14 @@ _COMMANDS = {
     "temp_valid": (0x064, Kind.SETTING),
     "irq_mask": (0x068, Kind.COMMAND),
     "irq_clear": (0x06C, Kind.PULSE),
+    "ring_arm": (0x3C0, Kind.PULSE),
+    "ring_stop": (0x3C4, Kind.PULSE),
+    "ring_faults": (0x3C8, Kind.COMMAND),
+    "ring_word": (0x3CC, Kind.COMMAND),
+    "ring_high": (0x3D0, Kind.COMMAND),
+    "ring_low": (0x3D4, Kind.COMMAND),
+    "ring_after": (0x3D8, Kind.COMMAND),
+    "ring_address": (0x3DC, Kind.COMMAND),
 }
 _STATUS = """
     084 flux_faults   088 min_pulse_used  08c omega_me     090 theta_me       094 i_d          098 i_q
@@ -132,7 +140,7 @@ _STATUS = """
     0b4 lambda_q      0b8 psi_m           0bc v_dead       0c0 v_comp
     0c8 telemetry_dropped                 0cc fault_flags      0d0 first_fault    0d4 early_samples
     0d8 irq_cause     0dc code_a          0e0 code_b           0e4 code_c         0e8 code_u_dc
-    0ec code_theta
+    0ec code_theta    3e4 ring_depth      3e8 ring_next    3ec ring_data
 """
 # Bits of the word "flags", read together: name -> lowest bit.
 _FLAGS = {
@@ -151,18 +159,25 @@ _FLAGS = {
     "brake_asked": 14,
     "double_used": 15,
 }
+# Bits of the word "ring_state", likewise
+_RING_STATE = {"ring_recording": 0, "ring_ended": 1, "ring_full": 2, "ring_cause": 4}
 
 # Pins of the core: inputs per sample or clock that do not come from software.
 PINS = ("adc_a", "adc_b", "adc_c", "adc_u_dc", "position_code", "trip")
 INTERNAL = ("run_in", "compare_a", "compare_b", "compare_c")  # between two blocks
 _IRQ = {p.name: p for p in (*interrupts.BLOCK.inputs, *interrupts.BLOCK.outputs) if p.name.startswith("irq_")}
-_BESIDE_THE_CORE = _IRQ | {
-    p.name: p
-    for p in (
-        Port("telemetry_enable", BIT, doc="1: send a packet for each sample"),
-        Port("telemetry_dropped", telemetry.DROPPED, doc="samples without a packet, up to 65535"),
-    )
-}
+_RING = {p.name: p for p in (*telemetry_ring.BLOCK.inputs, *telemetry_ring.BLOCK.outputs) if p.name.startswith("ring_")}
+_BESIDE_THE_CORE = (
+    _IRQ
+    | _RING
+    | {
+        p.name: p
+        for p in (
+            Port("telemetry_enable", BIT, doc="1: send a packet for each sample"),
+            Port("telemetry_dropped", telemetry.DROPPED, doc="samples without a packet, up to 65535"),
+        )
+    }
+)
 
 
 def _table(text: str) -> dict[str, int]:
@@ -179,7 +194,13 @@ SETTINGS, STATUS = _table(_SETTINGS), _table(_STATUS)
 
 def inputs() -> dict[str, Port]:
     """The inputs of the core that are neither registers nor pins, by the name for software."""
-    beside = (_BESIDE_THE_CORE[name] for name in ("telemetry_enable", "irq_mask", "irq_clear"))
+    names = (
+        "telemetry_enable",
+        "irq_mask",
+        "irq_clear",
+        *(p.name for p in telemetry_ring.BLOCK.inputs if p.name in _RING),
+    )
+    beside = (_BESIDE_THE_CORE[name] for name in names)
     ports = (*sample_latch.BLOCK.inputs, *gate_generation.BLOCK.inputs, *beside)
     return {p.name.removesuffix("_in"): p for p in ports if p.name not in PINS + INTERNAL}
 
@@ -198,7 +219,9 @@ def _read_only() -> list[Register]:
     def word(name: str, address: int, kind: Kind, doc: str, reset: int = 0) -> Register:
         return Register(name, address, kind, (Field(name, Port(name, WORD, doc=doc)),), doc, reset)
 
-    flags = tuple(Field(name, shown[name], bit) for name, bit in _FLAGS.items())
+    flags, ring_state = (
+        tuple(Field(name, shown[name], bit) for name, bit in table.items()) for table in (_FLAGS, _RING_STATE)
+    )
     return [
         word("identification", 0x000, Kind.CONSTANT, "the letters FLUX", IDENTIFICATION),
         word("version", 0x004, Kind.CONSTANT, "version of the core: major, minor, patch in bits 23 to 0"),
@@ -209,6 +232,7 @@ def _read_only() -> list[Register]:
         word("estimators", 0x018, Kind.GENERIC, "1: with estimators, 0: field-oriented control alone"),
         word("references", 0x01C, Kind.GENERIC, "1: with current references by a table of torque and flux limit"),
         Register("flags", 0x080, Kind.STATUS, flags, "status flags of the core, read together"),
+        Register("ring_state", 0x3E0, Kind.STATUS, ring_state, "what the ring of telemetry does, read together"),
         *(
             Register(name, address, Kind.STATUS, (Field(name, shown[name]),), shown[name].doc)
             for name, address in STATUS.items()

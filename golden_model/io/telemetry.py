@@ -8,6 +8,7 @@ from TELEMETRY_WORDS_START clocks after the sample on, into a queue (packet_fifo
   it, up to 2**DROPPED_W - 1, and the reader sees a gap in the sample numbers, which count from 0 after a reset, modulo
   2**NUMBER_W.  These widths, 16 and 32 on a chip, are generics so that a bench can fill the counters.
 * ``enable`` is checked before the first word: a packet that has begun is completed.
+* The words also leave before the queue, for telemetry_ring, with which a packet is made where the queue takes none.
 * As in the core, a sample less than SAMPLE_INTERVAL clocks after the last one is ignored and not counted.
 
 Formats: unchanged, see telemetry_words.
@@ -42,10 +43,11 @@ class State(NamedTuple):
     valid_2: int = 0
     word_2: int = 0
     last_2: int = 0
+    queued: int = 0  # the queue takes the packet
     queue: packet_fifo.State = packet_fifo.State()
 
 
-def step(state, enable, sample_valid, m_axis_tready, *values):
+def step(state, enable, sample_valid, m_axis_tready, ring_recording, *values):
     """One clock; ``values``: the raw sample, the core's values in the order of SHOWN, then the generics."""
     s, (depth_bits, number_w, dropped_w) = state, values[-3:]
     raw, shown = values[: len(INPUTS)], values[len(INPUTS) : len(INPUTS) + len(SHOWN)]
@@ -59,10 +61,12 @@ def step(state, enable, sample_valid, m_axis_tready, *values):
     if s.active:
         index = s.index + 1
         active = 0 if s.index == COUNT - 1 else 1
-    if s.age == START - 1 and enable:
-        if packet_fifo.room(s.queue, depth_bits, COUNT):
+    queued = s.queued
+    if s.age == START - 1:
+        queued = 1 if enable and packet_fifo.room(s.queue, depth_bits, COUNT) else 0
+        if queued or ring_recording:
             active, index = 1, 0
-        else:
+        if enable and not queued:
             dropped = min(s.dropped + 1, (1 << dropped_w) - 1)
 
     word_1, last_1, word_2, last_2 = s.word_1, s.last_1, s.word_2, s.last_2
@@ -73,13 +77,13 @@ def step(state, enable, sample_valid, m_axis_tready, *values):
     if s.valid_1:
         word_2, last_2 = s.word_1, s.last_1
     queue, (tvalid, tdata, tlast, _) = packet_fifo.step(
-        s.queue, s.valid_2, s.word_2, s.last_2, m_axis_tready, WORD.width, depth_bits, COUNT
+        s.queue, s.valid_2 & s.queued, s.word_2, s.last_2, m_axis_tready, WORD.width, depth_bits, COUNT
     )
     following = State(
         age, counter, active, index, dropped, sample, tuple(shown),
-        s.active, word_1, last_1, s.valid_1, word_2, last_2, queue,
+        s.active, word_1, last_1, s.valid_1, word_2, last_2, queued, queue,
     )  # fmt: skip
-    return following, (tdata, tvalid, tlast, dropped)
+    return following, (tdata, tvalid, tlast, dropped, s.valid_1, word_2)
 
 
 def stimuli(rng, config):
@@ -95,6 +99,7 @@ def stimuli(rng, config):
         row |= {"m_axis_tready": ready, "sample_valid": int(wait == 0 or early), "enable": 1}
         if 4000 < clock < 4700:
             row["enable"] = int(rng.integers(2))
+        row["ring_recording"] = int(rng.integers(2)) if clock % 1000 > 700 else 0
         wait = INTERVAL - 1 if wait == 0 else wait - 1
         if wait == 0 and rng.integers(5) == 0:
             wait = int(rng.integers(1, 40))
@@ -106,6 +111,7 @@ def patient_stimuli(rng, config):
     """A sink that stalls until the count of lost packets and the samples' number are full."""
     ports = BLOCK.ports(config)
     row = {p.name: int(rng.integers(p.low, p.high + 1)) for p in ports} | {"m_axis_tready": 0, "enable": 1}
+    row["ring_recording"] = 0
     rows = [row | {"sample_valid": 1}] + [row | {"sample_valid": 0}] * (INTERVAL - 1)
     return rows * 300 + [row | {"m_axis_tready": 1}] * 400
 
@@ -120,6 +126,7 @@ BLOCK = Block(
         Port("enable", BIT, doc="1: send packets"),
         Port("sample_valid", BIT, doc="1: the raw sample below is valid"),
         Port("m_axis_tready", BIT, doc="1: the sink accepts the word"),
+        Port("ring_recording", BIT, doc="1: the ring takes the packet, whatever the queue does"),
         *(Port("running" if name == "run_in" else name, p.fmt, doc=p.doc) for name, p in _RAW.items()),
         *(PORTS[name] for name in SHOWN),
     ),
@@ -128,11 +135,13 @@ BLOCK = Block(
         Port("m_axis_tvalid", BIT, doc="1: the word is valid"),
         Port("m_axis_tlast", BIT, doc="1: last word of the packet"),
         Port("dropped", DROPPED, doc="samples without a packet because the queue was full"),
+        Port("row_valid", BIT, doc="1: a word of a packet before the queue"),
+        Port("row_word", WORD, doc="the word"),
     ),
     state=State(),
     latency=1,
     clocked=True,
-    shown_with={"m_axis_tdata": "m_axis_tvalid", "m_axis_tlast": "m_axis_tvalid"},
+    shown_with={"m_axis_tdata": "m_axis_tvalid", "m_axis_tlast": "m_axis_tvalid", "row_word": "row_valid"},
     constants={"AGE_W": INTERVAL.bit_length()},
     configs=(
         {"ADC_BITS": 16, "POSITION_BITS": 16, "DEPTH_BITS": 6, "NUMBER_W": WORD.width, "DROPPED_W": DROPPED.width},

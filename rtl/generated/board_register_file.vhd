@@ -67,6 +67,14 @@ entity board_register_file is
     temp_valid_in     : out std_logic;  -- 064 1: temp_winding is valid
     irq_mask          : out unsigned(3 downto 0);  -- 068 bit x: cause x of irq_cause does not raise irq
     irq_clear         : out unsigned(3 downto 0);  -- 06c bit x: clear cause x of irq_cause
+    ring_arm          : out std_logic;  -- 3c0 1: forget the ring's rows and record
+    ring_stop         : out std_logic;  -- 3c4 1: a trigger of the ring, as a trip is
+    ring_faults       : out unsigned(16 downto 0);  -- 3c8 bit x: fault x, when it appears, ends the ring; bit 16: a trip
+    ring_word         : out unsigned(4 downto 0);  -- 3cc word of the packet that ends the ring beyond its limits; 0: none
+    ring_high         : out signed(18 downto 0);  -- 3d0 upper limit of this word
+    ring_low          : out signed(18 downto 0);  -- 3d4 lower limit of this word
+    ring_after        : out unsigned(11 downto 0);  -- 3d8 rows to record after the row of the trigger
+    ring_address      : out unsigned(15 downto 0);  -- 3dc address of ring_data, in words
     clear_encoder     : out std_logic;  -- 410 1: clear faults and counters of encoder and converters
     take_snapshot     : out std_logic;  -- 414 1: keep what the next sample brings, see snap_ready
     position_source   : out std_logic;  -- 418 0: encoder, 1: forced_angle
@@ -137,6 +145,13 @@ entity board_register_file is
     first_fault       : in  unsigned(15 downto 0);  -- 0d0 faults that tripped first
     early_samples     : in  unsigned(7 downto 0);  -- 0d4 samples rejected because they came too early
     irq_cause         : in  unsigned(3 downto 0);  -- 0d8 causes since they were cleared: trip, fault, setting refused, gates gone off
+    ring_recording    : in  std_logic;  -- 3e0 1: the ring records
+    ring_ended        : in  std_logic;  -- 3e0 1: the ring has ended, its rows stay
+    ring_full         : in  std_logic;  -- 3e0 1: every row of the ring is written
+    ring_cause        : in  unsigned(3 downto 0);  -- 3e0 what ended the ring: 1 trip, 2 fault, 4 threshold, 8 write
+    ring_depth        : in  unsigned(11 downto 0);  -- 3e4 rows of the ring as built, 0: left out
+    ring_next         : in  unsigned(15 downto 0);  -- 3e8 address after the newest row: of the oldest, if ring_full
+    ring_data         : in  unsigned(31 downto 0);  -- 3ec the ring's word at ring_address
     encoder_flags     : in  unsigned(10 downto 0);  -- 440 flags of the encoder, see position_front
     encoder_count     : in  unsigned(17 downto 0);  -- 444 count of the encoder, latched by the trigger
     index_count       : in  unsigned(17 downto 0);  -- 448 count found at the last index
@@ -283,6 +298,8 @@ begin
       -- came in at the edge at which they rose
       clear_trip    <= '0';
       irq_clear     <= (others => '0');
+      ring_arm      <= '0';
+      ring_stop     <= '0';
       clear_encoder <= '0';
       take_snapshot <= '0';
       if (sample_busy and not was_busy and was_clear_faults_in) = '1' then
@@ -702,6 +719,36 @@ begin
         settings.torque_step <= signed(held(17 downto 0));
         written(157)         <= '1';
       end if;
+      if (row(30) and column(0)) = '1' then
+        ring_arm <= held(0);
+      end if;
+      if (row(30) and column(1)) = '1' then
+        ring_stop <= held(0);
+      end if;
+      if (row(30) and column(2)) = '1' then
+        ring_faults  <= unsigned(held(16 downto 0));
+        written(242) <= '1';
+      end if;
+      if (row(30) and column(3)) = '1' then
+        ring_word    <= unsigned(held(4 downto 0));
+        written(243) <= '1';
+      end if;
+      if (row(30) and column(4)) = '1' then
+        ring_high    <= signed(held(18 downto 0));
+        written(244) <= '1';
+      end if;
+      if (row(30) and column(5)) = '1' then
+        ring_low     <= signed(held(18 downto 0));
+        written(245) <= '1';
+      end if;
+      if (row(30) and column(6)) = '1' then
+        ring_after   <= unsigned(held(11 downto 0));
+        written(246) <= '1';
+      end if;
+      if (row(30) and column(7)) = '1' then
+        ring_address <= unsigned(held(15 downto 0));
+        written(247) <= '1';
+      end if;
       if (row(32) and column(4)) = '1' then
         clear_encoder <= held(0);
       end if;
@@ -1047,6 +1094,14 @@ begin
         settings.table_word       <= (others => '0');
         settings.v_start          <= (others => '0');
         settings.torque_step      <= (others => '0');
+        ring_arm                  <= '0';
+        ring_stop                 <= '0';
+        ring_faults               <= (others => '0');
+        ring_word                 <= (others => '0');
+        ring_high                 <= (others => '0');
+        ring_low                  <= (others => '0');
+        ring_after                <= (others => '0');
+        ring_address              <= (others => '0');
         clear_encoder             <= '0';
         take_snapshot             <= '0';
         position_source           <= '0';
@@ -1293,7 +1348,16 @@ begin
   shown(74 to 98)   <= (others => (others => '0'));
   shown(99)         <= x"00000100";
   shown(100)        <= x"00001000";
-  shown(101 to 255) <= (others => (others => '0'));
+  shown(101 to 239) <= (others => (others => '0'));
+  shown(240)        <= "0000000000000000000000000000000" & ring_arm;
+  shown(241)        <= "0000000000000000000000000000000" & ring_stop;
+  shown(242 to 247) <= (others => (others => '0'));
+  shown(248)        <= "000000000000000000000000" & std_logic_vector(ring_cause) & "0" & ring_full & ring_ended &
+                       ring_recording;
+  shown(249)        <= std_logic_vector(resize(ring_depth, 32));
+  shown(250)        <= std_logic_vector(resize(ring_next, 32));
+  shown(251)        <= std_logic_vector(resize(ring_data, 32));
+  shown(252 to 255) <= (others => (others => '0'));
   shown(256)        <= std_logic_vector(to_unsigned(ENCODER, 32));
   shown(257)        <= std_logic_vector(to_unsigned(CURRENTS, 32));
   shown(258)        <= std_logic_vector(to_unsigned(SPI_LINES, 32));

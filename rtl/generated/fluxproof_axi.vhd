@@ -26,6 +26,7 @@ entity fluxproof_axi is
     CARRIER_HALF  : integer range 8 to 32767     := 10000;  -- half a PWM period in clocks
     ESTIMATORS    : integer range 0 to 1         := 1;  -- 0 leaves the estimators out
     REFERENCES    : integer range 0 to 1         := 0;  -- 1 builds the torque table
+    RING_ROWS     : integer range 0 to 2730      := 0;  -- telemetry rows of the ring, 42 in a block RAM; 0 leaves it out
     GATE_ACTIVE   : integer range 0 to 1         := 1;  -- level of gate_high and gate_low at which a switch is on
     TRIP_ACTIVE   : integer range 0 to 1         := 1;  -- level of trip that turns the gates off
     BRAKE_ACTIVE  : integer range 0 to 1         := 1  -- level of brake at which the resistor is on
@@ -88,6 +89,14 @@ architecture rtl of fluxproof_axi is
   signal temp_valid_in     : std_logic;
   signal irq_mask          : unsigned(3 downto 0);
   signal irq_clear         : unsigned(3 downto 0);
+  signal ring_arm          : std_logic;
+  signal ring_stop         : std_logic;
+  signal ring_faults       : unsigned(16 downto 0);
+  signal ring_word         : unsigned(4 downto 0);
+  signal ring_high         : signed(18 downto 0);
+  signal ring_low          : signed(18 downto 0);
+  signal ring_after        : unsigned(11 downto 0);
+  signal ring_address      : unsigned(15 downto 0);
   signal gate_high_next    : unsigned(2 downto 0);
   signal gate_low_next     : unsigned(2 downto 0);
   signal trigger_next      : std_logic;
@@ -105,6 +114,15 @@ architecture rtl of fluxproof_axi is
   signal estimated         : estimated_t;
   signal m_axis_tdata_out  : unsigned(31 downto 0);
   signal telemetry_dropped : unsigned(15 downto 0);
+  signal row_valid         : std_logic;
+  signal row_word          : unsigned(31 downto 0);
+  signal ring_recording    : std_logic;
+  signal ring_ended        : std_logic;
+  signal ring_full         : std_logic;
+  signal ring_cause        : unsigned(3 downto 0);
+  signal ring_next         : unsigned(15 downto 0);
+  signal ring_data         : unsigned(31 downto 0);
+  signal ring_depth        : unsigned(11 downto 0);
   signal irq_cause         : unsigned(3 downto 0);
   signal trip_now          : std_logic;
   signal sample            : sample_t;
@@ -177,6 +195,14 @@ begin
       temp_valid_in     => temp_valid_in,
       irq_mask          => irq_mask,
       irq_clear         => irq_clear,
+      ring_arm          => ring_arm,
+      ring_stop         => ring_stop,
+      ring_faults       => ring_faults,
+      ring_word         => ring_word,
+      ring_high         => ring_high,
+      ring_low          => ring_low,
+      ring_after        => ring_after,
+      ring_address      => ring_address,
       running           => running,
       tripped           => tripped,
       setting_refused   => setting_refused,
@@ -186,7 +212,14 @@ begin
       fault_flags       => fault_flags,
       first_fault       => first_fault,
       early_samples     => early_samples,
-      irq_cause         => irq_cause
+      irq_cause         => irq_cause,
+      ring_recording    => ring_recording,
+      ring_ended        => ring_ended,
+      ring_full         => ring_full,
+      ring_cause        => ring_cause,
+      ring_depth        => ring_depth,
+      ring_next         => ring_next,
+      ring_data         => ring_data
     );
 
   core : entity work.fluxproof
@@ -234,19 +267,50 @@ begin
       POSITION_BITS => POSITION_BITS
     )
     port map (
-      clk           => aclk,
-      rst           => rst,
-      enable        => telemetry_enable,
-      sample_valid  => sample_valid,
-      m_axis_tready => m_axis_tready,
-      sample        => sample,
-      running       => running,
-      observed      => observed,
-      estimated     => estimated,
-      m_axis_tdata  => m_axis_tdata_out,
-      m_axis_tvalid => m_axis_tvalid,
-      m_axis_tlast  => m_axis_tlast,
-      dropped       => telemetry_dropped
+      clk            => aclk,
+      rst            => rst,
+      enable         => telemetry_enable,
+      sample_valid   => sample_valid,
+      m_axis_tready  => m_axis_tready,
+      ring_recording => ring_recording,
+      sample         => sample,
+      running        => running,
+      observed       => observed,
+      estimated      => estimated,
+      m_axis_tdata   => m_axis_tdata_out,
+      m_axis_tvalid  => m_axis_tvalid,
+      m_axis_tlast   => m_axis_tlast,
+      dropped        => telemetry_dropped,
+      row_valid      => row_valid,
+      row_word       => row_word
+    );
+
+  ring : entity work.telemetry_ring
+    generic map (
+      RING_ROWS => RING_ROWS
+    )
+    port map (
+      clk            => aclk,
+      rst            => rst,
+      row_valid      => row_valid,
+      row_word       => row_word,
+      tripped        => tripped,
+      fault_flags    => fault_flags,
+      ring_arm       => ring_arm,
+      ring_stop      => ring_stop,
+      ring_faults    => ring_faults,
+      ring_word      => ring_word,
+      ring_high      => ring_high,
+      ring_low       => ring_low,
+      ring_after     => ring_after,
+      ring_address   => ring_address,
+      ring_recording => ring_recording,
+      ring_ended     => ring_ended,
+      ring_full      => ring_full,
+      ring_cause     => ring_cause,
+      ring_next      => ring_next,
+      ring_data      => ring_data,
+      ring_depth     => ring_depth
     );
 
   cause : entity work.interrupts

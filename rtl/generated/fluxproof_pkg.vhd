@@ -1214,6 +1214,10 @@ package fluxproof_pkg is
   constant TELEMETRY_LATENCY : positive := 1;
   constant TELEMETRY_AGE_W : natural := 6;
 
+  -- telemetry_ring: none: recording of samples
+  constant TELEMETRY_RING_LATENCY : positive := 1;
+  constant TELEMETRY_RING_LEVEL_W : natural := 19;
+
   -- telemetry_words: none: recording of samples
   constant TELEMETRY_WORDS_LATENCY : positive := 2;
   constant TELEMETRY_WORDS_COUNT : natural := 24;

@@ -64,6 +64,14 @@ entity register_file is
     temp_valid_in     : out std_logic;  -- 064 1: temp_winding is valid
     irq_mask          : out unsigned(3 downto 0);  -- 068 bit x: cause x of irq_cause does not raise irq
     irq_clear         : out unsigned(3 downto 0);  -- 06c bit x: clear cause x of irq_cause
+    ring_arm          : out std_logic;  -- 3c0 1: forget the ring's rows and record
+    ring_stop         : out std_logic;  -- 3c4 1: a trigger of the ring, as a trip is
+    ring_faults       : out unsigned(16 downto 0);  -- 3c8 bit x: fault x, when it appears, ends the ring; bit 16: a trip
+    ring_word         : out unsigned(4 downto 0);  -- 3cc word of the packet that ends the ring beyond its limits; 0: none
+    ring_high         : out signed(18 downto 0);  -- 3d0 upper limit of this word
+    ring_low          : out signed(18 downto 0);  -- 3d4 lower limit of this word
+    ring_after        : out unsigned(11 downto 0);  -- 3d8 rows to record after the row of the trigger
+    ring_address      : out unsigned(15 downto 0);  -- 3dc address of ring_data, in words
     running           : in  std_logic;  -- 080 gates are switching
     tripped           : in  std_logic;  -- 080 1: a trip is latched
     setting_refused   : in  std_logic;  -- 080 1: dead_time and min_pulse contradict each other, refused
@@ -73,7 +81,14 @@ entity register_file is
     fault_flags       : in  unsigned(15 downto 0);  -- 0cc faults since the last clear_trip, see fault_latch
     first_fault       : in  unsigned(15 downto 0);  -- 0d0 faults that tripped first
     early_samples     : in  unsigned(7 downto 0);  -- 0d4 samples rejected because they came too early
-    irq_cause         : in  unsigned(3 downto 0)  -- 0d8 causes since they were cleared: trip, fault, setting refused, gates gone off
+    irq_cause         : in  unsigned(3 downto 0);  -- 0d8 causes since they were cleared: trip, fault, setting refused, gates gone off
+    ring_recording    : in  std_logic;  -- 3e0 1: the ring records
+    ring_ended        : in  std_logic;  -- 3e0 1: the ring has ended, its rows stay
+    ring_full         : in  std_logic;  -- 3e0 1: every row of the ring is written
+    ring_cause        : in  unsigned(3 downto 0);  -- 3e0 what ended the ring: 1 trip, 2 fault, 4 threshold, 8 write
+    ring_depth        : in  unsigned(11 downto 0);  -- 3e4 rows of the ring as built, 0: left out
+    ring_next         : in  unsigned(15 downto 0);  -- 3e8 address after the newest row: of the oldest, if ring_full
+    ring_data         : in  unsigned(31 downto 0)  -- 3ec the ring's word at ring_address
   );
 end entity register_file;
 
@@ -200,6 +215,8 @@ begin
       -- came in at the edge at which they rose
       clear_trip <= '0';
       irq_clear  <= (others => '0');
+      ring_arm   <= '0';
+      ring_stop  <= '0';
       if (sample_busy and not was_busy and was_clear_faults_in) = '1' then
         clear_faults_in <= '0';
       end if;
@@ -617,6 +634,36 @@ begin
         settings.torque_step <= signed(held(17 downto 0));
         written(157)         <= '1';
       end if;
+      if (row(30) and column(0)) = '1' then
+        ring_arm <= held(0);
+      end if;
+      if (row(30) and column(1)) = '1' then
+        ring_stop <= held(0);
+      end if;
+      if (row(30) and column(2)) = '1' then
+        ring_faults  <= unsigned(held(16 downto 0));
+        written(242) <= '1';
+      end if;
+      if (row(30) and column(3)) = '1' then
+        ring_word    <= unsigned(held(4 downto 0));
+        written(243) <= '1';
+      end if;
+      if (row(30) and column(4)) = '1' then
+        ring_high    <= signed(held(18 downto 0));
+        written(244) <= '1';
+      end if;
+      if (row(30) and column(5)) = '1' then
+        ring_low     <= signed(held(18 downto 0));
+        written(245) <= '1';
+      end if;
+      if (row(30) and column(6)) = '1' then
+        ring_after   <= unsigned(held(11 downto 0));
+        written(246) <= '1';
+      end if;
+      if (row(30) and column(7)) = '1' then
+        ring_address <= unsigned(held(15 downto 0));
+        written(247) <= '1';
+      end if;
 
       if rst = '1' then
         written                   <= (others => '0');
@@ -724,6 +771,14 @@ begin
         settings.table_word       <= (others => '0');
         settings.v_start          <= (others => '0');
         settings.torque_step      <= (others => '0');
+        ring_arm                  <= '0';
+        ring_stop                 <= '0';
+        ring_faults               <= (others => '0');
+        ring_word                 <= (others => '0');
+        ring_high                 <= (others => '0');
+        ring_low                  <= (others => '0');
+        ring_after                <= (others => '0');
+        ring_address              <= (others => '0');
       end if;
     end if;
   end process;
@@ -849,7 +904,7 @@ begin
       if is_written_3 = '1' then
         read_data <= std_logic_vector(resize(signed(copied_2), 32));
       elsif is_signed_1 = '1' then
-        read_data <= std_logic_vector(resize(signed(picked_3(17 downto 0)), 32));
+        read_data <= std_logic_vector(resize(signed(picked_3(18 downto 0)), 32));
       else
         read_data <= picked_3;
       end if;
@@ -859,7 +914,7 @@ begin
     end if;
   end process;
 
-  -- Contents of the other words, signed numbers in 18 bits; the places between are zero
+  -- Contents of the other words, signed numbers in 19 bits; the places between are zero
   shown(0)          <= x"464C5558";
   shown(1)          <= x"00000200";
   shown(2)          <= std_logic_vector(to_unsigned(ADC_BITS, 32));
@@ -880,20 +935,20 @@ begin
                        std_logic_vector(observed.current_at_rail) & setting_refused & tripped & running;
   shown(33)         <= std_logic_vector(resize(estimated.flux_faults, 32));
   shown(34)         <= std_logic_vector(resize(min_pulse_used, 32));
-  shown(35)         <= "00000000000000" & std_logic_vector(resize(observed.omega_me, 18));
+  shown(35)         <= "0000000000000" & std_logic_vector(resize(observed.omega_me, 19));
   shown(36)         <= std_logic_vector(resize(observed.theta_me, 32));
-  shown(37)         <= "00000000000000" & std_logic_vector(resize(observed.i_d, 18));
-  shown(38)         <= "00000000000000" & std_logic_vector(resize(observed.i_q, 18));
-  shown(39)         <= "00000000000000" & std_logic_vector(resize(observed.i_q_ref, 18));
+  shown(37)         <= "0000000000000" & std_logic_vector(resize(observed.i_d, 19));
+  shown(38)         <= "0000000000000" & std_logic_vector(resize(observed.i_q, 19));
+  shown(39)         <= "0000000000000" & std_logic_vector(resize(observed.i_q_ref, 19));
   shown(40)         <= std_logic_vector(resize(observed.u_dc, 32));
-  shown(41)         <= "00000000000000" & std_logic_vector(resize(observed.u_d, 18));
-  shown(42)         <= "00000000000000" & std_logic_vector(resize(observed.u_q, 18));
-  shown(43)         <= "00000000000000" & std_logic_vector(resize(estimated.torque, 18));
-  shown(44)         <= "00000000000000" & std_logic_vector(resize(observed.lambda_d, 18));
-  shown(45)         <= "00000000000000" & std_logic_vector(resize(observed.lambda_q, 18));
-  shown(46)         <= "00000000000000" & std_logic_vector(resize(estimated.psi_m, 18));
-  shown(47)         <= "00000000000000" & std_logic_vector(resize(estimated.v_dead, 18));
-  shown(48)         <= "00000000000000" & std_logic_vector(resize(estimated.v_comp, 18));
+  shown(41)         <= "0000000000000" & std_logic_vector(resize(observed.u_d, 19));
+  shown(42)         <= "0000000000000" & std_logic_vector(resize(observed.u_q, 19));
+  shown(43)         <= "0000000000000" & std_logic_vector(resize(estimated.torque, 19));
+  shown(44)         <= "0000000000000" & std_logic_vector(resize(observed.lambda_d, 19));
+  shown(45)         <= "0000000000000" & std_logic_vector(resize(observed.lambda_q, 19));
+  shown(46)         <= "0000000000000" & std_logic_vector(resize(estimated.psi_m, 19));
+  shown(47)         <= "0000000000000" & std_logic_vector(resize(estimated.v_dead, 19));
+  shown(48)         <= "0000000000000" & std_logic_vector(resize(estimated.v_comp, 19));
   shown(49 to 49)   <= (others => (others => '0'));
   shown(50)         <= std_logic_vector(resize(telemetry_dropped, 32));
   shown(51)         <= std_logic_vector(resize(fault_flags, 32));
@@ -910,6 +965,15 @@ begin
   shown(74 to 98)   <= (others => (others => '0'));
   shown(99)         <= x"00000100";
   shown(100)        <= x"00001000";
-  shown(101 to 255) <= (others => (others => '0'));
+  shown(101 to 239) <= (others => (others => '0'));
+  shown(240)        <= "0000000000000000000000000000000" & ring_arm;
+  shown(241)        <= "0000000000000000000000000000000" & ring_stop;
+  shown(242 to 247) <= (others => (others => '0'));
+  shown(248)        <= "000000000000000000000000" & std_logic_vector(ring_cause) & "0" & ring_full & ring_ended &
+                       ring_recording;
+  shown(249)        <= std_logic_vector(resize(ring_depth, 32));
+  shown(250)        <= std_logic_vector(resize(ring_next, 32));
+  shown(251)        <= std_logic_vector(resize(ring_data, 32));
+  shown(252 to 255) <= (others => (others => '0'));
 
 end architecture rtl;

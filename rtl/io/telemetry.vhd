@@ -6,7 +6,8 @@
 -- The controller never waits: if the packet of a sample does not fit into the queue, it is dropped; dropped counts it,
 -- up to 2**DROPPED_W - 1.  The sample numbers count from 0 after a reset, modulo 2**NUMBER_W.  enable is checked before
 -- the first word: a packet that has begun is completed.  A sample less than FLUXPROOF_SAMPLE_INTERVAL clocks after the
--- last one is ignored and not counted.
+-- last one is ignored and not counted.  The words also leave before the queue, for telemetry_ring, with which a packet is
+-- made where the queue takes none.
 -- Formats: unchanged, see telemetry_words.  The queue holds 2**DEPTH_BITS words.
 -- Latency: the first word is valid TELEMETRY_WORDS_START + 5 clocks after sample_valid.  Rounding: none.
 
@@ -24,19 +25,22 @@ entity telemetry is
     DROPPED_W     : positive range 2 to 16  := 16
   );
   port (
-    clk           : in  std_logic;
-    rst           : in  std_logic;  -- synchronous, active high
-    enable        : in  std_logic;  -- 1: send packets
-    sample_valid  : in  std_logic;  -- 1: the raw sample below is valid
-    m_axis_tready : in  std_logic;  -- 1: the sink accepts the word
-    sample        : in  sample_t;  -- codes of converters and encoder, references
-    running       : in  std_logic;  -- 1: the gates are switching
-    observed      : in  observed_t;  -- values of the sample
-    estimated     : in  estimated_t;  -- values of the estimators
-    m_axis_tdata  : out unsigned(31 downto 0);  -- a word of the packet
-    m_axis_tvalid : out std_logic;  -- 1: the word is valid
-    m_axis_tlast  : out std_logic;  -- 1: last word of the packet
-    dropped       : out unsigned(15 downto 0)  -- samples without a packet because the queue was full
+    clk            : in  std_logic;
+    rst            : in  std_logic;  -- synchronous, active high
+    enable         : in  std_logic;  -- 1: send packets
+    sample_valid   : in  std_logic;  -- 1: the raw sample below is valid
+    m_axis_tready  : in  std_logic;  -- 1: the sink accepts the word
+    ring_recording : in  std_logic;  -- 1: the ring takes the packet, whatever the queue does
+    sample         : in  sample_t;  -- codes of converters and encoder, references
+    running        : in  std_logic;  -- 1: the gates are switching
+    observed       : in  observed_t;  -- values of the sample
+    estimated      : in  estimated_t;  -- values of the estimators
+    m_axis_tdata   : out unsigned(31 downto 0);  -- a word of the packet
+    m_axis_tvalid  : out std_logic;  -- 1: the word is valid
+    m_axis_tlast   : out std_logic;  -- 1: last word of the packet
+    dropped        : out unsigned(15 downto 0);  -- samples without a packet because the queue was full
+    row_valid      : out std_logic;  -- 1: a word of a packet before the queue
+    row_word       : out unsigned(31 downto 0)  -- the word
   );
 end entity telemetry;
 
@@ -76,6 +80,8 @@ architecture rtl of telemetry is
   signal valid_2 : std_logic;
   signal word_2  : unsigned(31 downto 0);
   signal last_2  : std_logic;
+  signal queued  : std_logic;  -- the queue takes the packet
+  signal valid_q : std_logic;
 begin
   taken <= sample_valid and free;
   start <= enable and ready;
@@ -106,7 +112,10 @@ begin
         index  <= index + 1;
         active <= not final;
       end if;
-      if start = '1' and room = '1' then
+      if ready = '1' then
+        queued <= enable and room;
+      end if;
+      if (start and room) = '1' or (ready and ring_recording) = '1' then
         active <= '1';
         index  <= (others => '0');
       end if;
@@ -131,6 +140,7 @@ begin
         full    <= '0';
         counter <= NONE;
         active  <= '0';
+        queued  <= '0';
         valid_1 <= '0';
         drops   <= (others => '0');
       end if;
@@ -160,10 +170,13 @@ begin
 
   queue : entity work.packet_fifo
     generic map (WIDTH => 32, DEPTH_BITS => DEPTH_BITS, PACKET => COUNT)
-    port map (clk => clk, rst => rst, in_valid => valid_2, in_data => word_2, in_last => last_2,
+    port map (clk => clk, rst => rst, in_valid => valid_q, in_data => word_2, in_last => last_2,
               out_ready => m_axis_tready,
               out_valid => m_axis_tvalid, out_data => m_axis_tdata, out_last => m_axis_tlast, room => room);
 
-  dropped <= resize(drops, 16);
+  valid_q   <= valid_2 and queued;
+  dropped   <= resize(drops, 16);
+  row_valid <= valid_2;
+  row_word  <= word_2;
 
 end architecture rtl;

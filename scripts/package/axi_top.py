@@ -25,6 +25,7 @@ INSTANCES = {
     "registers": "generated/register_file.vhd",
     "core": "fluxproof.vhd",
     "stream": "io/telemetry.vhd",
+    "ring": "io/telemetry_ring.vhd",
     "cause": "io/interrupts.vhd",
     "stage": "io/power_stage.vhd",
 }
@@ -47,12 +48,14 @@ GENERICS = {
     "CARRIER_HALF": ("integer range 8 to 32767", 10000, "half a PWM period in clocks"),
     "ESTIMATORS": ("integer range 0 to 1", 1, "0 leaves the estimators out"),
     "REFERENCES": ("integer range 0 to 1", 0, "1 builds the torque table"),
+    "RING_ROWS": ("integer range 0 to 2730", 0, "telemetry rows of the ring, 42 in a block RAM; 0 leaves it out"),
     "GATE_ACTIVE": ("integer range 0 to 1", 1, "level of gate_high and gate_low at which a switch is on"),
     "TRIP_ACTIVE": ("integer range 0 to 1", 1, "level of trip that turns the gates off"),
     "BRAKE_ACTIVE": ("integer range 0 to 1", 1, "level of brake at which the resistor is on"),
 }
-# The telemetry's queue, of which 512 words are one block RAM; its counters, which only a bench makes smaller
-LEFT_AT_DEFAULT = {"DEPTH_BITS", "NUMBER_W", "DROPPED_W"}
+# The telemetry's queue, of which 512 words are one block RAM; its counters and the ring's rows, which only a bench
+# makes smaller
+LEFT_AT_DEFAULT = {"DEPTH_BITS", "NUMBER_W", "DROPPED_W", "ROW_WORDS"}
 LITE, CODE, POSITION = "31 downto 0", "ADC_BITS - 1 downto 0", "POSITION_BITS - 1 downto 0"
 # pins of the top: name, mode, range of its bits (None: one), comment
 PINS = (

@@ -7,6 +7,7 @@ from scripts.prove.proof import Fault, Proof, committed
 
 SLAVE = "io/axi_lite_slave.vhd"
 QUEUE = "common/packet_fifo.vhd"
+RING = "io/telemetry_ring.vhd"
 MASTER = "the master keeps valid, address and data until ready"
 
 
@@ -123,5 +124,44 @@ PROOFS = (
         Fault("count wrong when both move", QUEUE, "take /= fetch", "take /= fetch or fetch = '1'"),
         method="bmc",
         assumed="; the writer begins a packet where there is room",
+    ),
+    Proof(
+        name="telemetry_ring",
+        says="once ended, the ring holds each row once, whole and in order, and as many after a stop as asked for",
+        entity="telemetry_ring",
+        harness=committed("telemetry_ring.sv"),
+        faults=(
+            Fault(
+                "recording begins inside a row",
+                RING,
+                "(waiting and not inside and not valid_1)",
+                "(waiting and not valid_1)",
+            ),
+            Fault("the oldest word is lost", RING, "+ 2 ** ADDRESS_W - 1) mod", "+ 2 ** ADDRESS_W - 2) mod"),
+            Fault(
+                "the last word enters twice",
+                RING,
+                "live = '1' and valid_1 = '1'",
+                "live = '1' and (valid_1 or end_2) = '1'",
+            ),
+            Fault(
+                "a row after the end",
+                RING,
+                "hit = '1' and end_2 = '1'",
+                "hit = '1' and (valid_1 and final_1) = '1' and left /= 1",
+            ),
+            Fault(
+                "arming keeps the place",
+                RING,
+                "        full     <= '0';\n        write_at <= (others => '0');\n        cause",
+                "        full     <= '0';\n        cause",
+            ),
+        ),
+        method="bmc",
+        depth=17,  # three rows, the end, a look; beyond, the solvers take too long
+        generics={"RING_ROWS": 2, "ROW_WORDS": 2},
+        assumed="a ring of 2 rows of 2 words of 1 bit, up to 1 row after a write that stops it",
+        search_depth=17,
+        patience=300,
     ),
 )

@@ -106,7 +106,9 @@ def arguments_of() -> argparse.Namespace:
         epilog=__doc__.split("\n\n", 1)[1],
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--block", nargs="+", metavar="ENTITY", help="count these entities alone, and stop")
+    parser.add_argument(
+        "--block", nargs="+", metavar="ENTITY", help="count these entities alone, and stop; ENTITY:GENERIC=N"
+    )
     parser.add_argument("--board", action="store_true", help="count each choice of a board's front ends, and stop")
     parser.add_argument("--family", nargs="+", choices=FAMILIES, metavar="FAMILY", help=f"of {', '.join(FAMILIES)}")
     parser.add_argument(

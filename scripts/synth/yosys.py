@@ -132,9 +132,17 @@ class Design:
         return name
 
     def modules(self, entity: str) -> tuple[str, list[str]]:
-        """The Verilog of all modules made of ``entity``, and their names; ValueError where there is none."""
+        """The Verilog of all modules made of ``entity``, and their names; ValueError where there is none.
+
+        ``entity:GENERIC=VALUE`` is the entity with a value of its own.
+        """
+        entity, *given = entity.split(":")
         if entity not in self.entities:
             raise ValueError(f"no entity {entity} under rtl; there are: {', '.join(sorted(self.entities))}")
+        if given:
+            generics = {name: int(value) for name, value in (pair.split("=") for pair in given)}
+            verilog = synthesize(rtl_sources(self.rtl), entity, generics)
+            return verilog, modules_of(verilog, entity, self.entities)
         if modules := modules_of(self.verilog, entity, self.entities):
             return part_of(self.verilog, modules), modules
         return synthesize(rtl_sources(self.rtl), entity, {}), [entity]  # nothing of the core uses it

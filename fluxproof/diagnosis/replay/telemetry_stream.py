@@ -89,7 +89,7 @@ def _find_start(raw: bytes, at: int) -> int:
     """The first offset from ``at`` with a complete valid packet that is followed by another one; or -1."""
     while (at := raw.find(MARK, at)) >= 0:
         behind = raw[at + SIZE : at + SIZE + len(MARK)]
-        if len(raw) - at >= SIZE and MARK.startswith(behind) and _sound(_rows(raw, at, 1))[0]:
+        if len(raw) - at >= SIZE and MARK.startswith(behind) and sound(_rows(raw, at, 1))[0]:
             return at
         at += 1
     return -1
@@ -106,23 +106,23 @@ def _whole_packets(raw: bytes, at: int) -> np.ndarray:
     broken = bool(len(others))
     rows = rows[: others[0]] if broken else rows
     last = at + SIZE * (len(rows) - 1)
-    if (broken or not _sound(rows[-1:])[0]) and raw.find(MARK, last + 1, last + SIZE + len(MARK) - 1) >= 0:
+    if (broken or not sound(rows[-1:])[0]) and raw.find(MARK, last + 1, last + SIZE + len(MARK) - 1) >= 0:
         inside = _find_start(raw, last + 1)
         if 0 <= inside < last + SIZE and len(rows) > 1:  # the next packet begins inside this one
             return rows[:-1]
     return rows
 
 
-def _sound(rows: np.ndarray) -> np.ndarray:
+def sound(rows: np.ndarray) -> np.ndarray:
     """(n,) bool: every field is sign- or zero-extended as its format requires, and all other bits are zero."""
     good = np.asarray(~(rows & ~USED).any(axis=1))
     for field in LAYOUT.values():
-        value = _values(rows, field)
+        value = values(rows, field)
         good &= (value >= field.port.fmt.lo) & (value <= field.port.fmt.hi)
     return good
 
 
-def _values(rows: np.ndarray, field) -> np.ndarray:
+def values(rows: np.ndarray, field) -> np.ndarray:
     """(n,) int64 of one field."""
     value = (rows[:, field.word].astype(np.int64) >> field.lsb) & ((1 << field.width) - 1)
     return value - ((value >> (field.width - 1)) << field.width) if field.signed else value
@@ -130,20 +130,20 @@ def _values(rows: np.ndarray, field) -> np.ndarray:
 
 def _check(rows: np.ndarray, places: np.ndarray, name: str) -> None:
     """Raise RecordingError for the first invalid packet."""
-    wrong = np.flatnonzero(~_sound(rows))
+    wrong = np.flatnonzero(~sound(rows))
     if len(wrong):
         raise RecordingError(f"{name}: {_what_is_wrong(rows[wrong[0]], int(places[wrong[0]]))}")
 
 
 def _pieces(rows: np.ndarray, places: np.ndarray) -> list[Piece]:
     """Packets split where the counter does not increase."""
-    numbers = _values(rows, LAYOUT[COUNTER])
+    numbers = values(rows, LAYOUT[COUNTER])
     step = (np.diff(numbers) + 2**31) % 2**32 - 2**31
     cuts = [0, *(np.flatnonzero(step <= 0) + 1).tolist(), len(rows)]
     found = []
     for first, stop in zip(cuts, cuts[1:], strict=False):
         counter = numbers[first] + np.concatenate(([0], np.cumsum(step[first : stop - 1])))
-        fields = {name: _values(rows[first:stop], LAYOUT[name]) for name in FIELDS}
+        fields = {name: values(rows[first:stop], LAYOUT[name]) for name in FIELDS}
         found.append(Piece(int(places[first]), counter, fields))
     return found
 
@@ -151,7 +151,7 @@ def _pieces(rows: np.ndarray, places: np.ndarray) -> list[Piece]:
 def _what_is_wrong(row: np.ndarray, byte: int) -> str:
     """Description of the first invalid word of a packet."""
     for field_name, field in LAYOUT.items():
-        value = int(_values(row[None], field)[0])
+        value = int(values(row[None], field)[0])
         if not field.port.fmt.lo <= value <= field.port.fmt.hi:
             shown = f"word {field.word} is 0x{row[field.word]:08x}: {field_name} = {value} is no {field.port.fmt}"
             return f"the packet at byte {byte} is damaged: {shown}"

@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The drive while it runs: packets out of broken streams, bounded memory, the replay beside them, the page."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import socket
+import subprocess
+import threading
+import time
+from urllib.request import urlopen
+
+import numpy as np
+import pytest
+
+from cocotb_tests.support.drives import PAPER
+from fluxproof.checkout import ROOT
+from fluxproof.command import main
+from fluxproof.cosim.scenarios import everything
+from fluxproof.diagnosis.replay.capture import capture
+from fluxproof.watch.live import Live
+from fluxproof.watch.packets import Packets
+from fluxproof.watch.page import Scene, allowed, serve, thinned, token_for
+from fluxproof.watch.replay import LiveReplay
+from fluxproof.watch.sinks import PlotJuggler
+from fluxproof.watch.source import Tcp, source_of
+from golden_model import drive as drives
+from golden_model import fluxproof
+from golden_model.drive_keys import DriveError
+from golden_model.io.telemetry_words import COUNT, PACKET, pack
+from golden_model.registers import registers
+
+DRIVE = drives.load(PAPER)
+SET = registers(DRIVE)
+
+
+@pytest.fixture(scope="module")
+def words():
+    """(2500, COUNT) uint32: the packets of a run that begins with a reset."""
+    samples, observed, _ = capture(DRIVE, SET, everything(DRIVE))
+    names = fluxproof.Sample._fields
+    rows = [
+        pack(k, dict(zip(names, samples[k], strict=True)) | {n: observed[n][k] for n in PACKET})
+        for k in range(len(samples))
+    ]
+    return np.array(rows, np.uint32)
+
+
+class Pieces:
+    """A source that gives what it is told, piece by piece."""
+
+    def __init__(self, *pieces: bytes):
+        self.pieces, self.breaks = list(pieces), 0
+
+    def read(self) -> bytes:
+        return self.pieces.pop(0) if self.pieces else b""
+
+    def close(self) -> None:
+        pass
+
+
+def raw(rows) -> bytes:
+    return np.ascontiguousarray(rows, "<u4").tobytes()
+
+
+def watched(*pieces: bytes, capacity: int = 1000) -> Live:
+    live = Live(Pieces(*pieces), capacity, LiveReplay(SET))
+    while live.source.pieces:
+        live.pump()
+    return live
+
+
+def test_packets_in_pieces(words):
+    """Cut anywhere, a stream gives the same packets; bad bytes cost the packets that they hit, and no other."""
+    rng, data = np.random.default_rng(1), raw(words[:200])
+    cuts = [0, *sorted(rng.integers(0, len(data), 60).tolist()), len(data)]
+    packets = Packets()
+    got = np.concatenate([packets.feed(data[a:b]) for a, b in zip(cuts, cuts[1:], strict=False)])
+    assert np.array_equal(got, words[:200]) and (packets.skipped, packets.rest) == (0, b"")
+
+    bad = words[:200].copy()
+    bad[50, 8] |= 1 << 31  # theta_me is unsigned
+    data = b"noise" + raw(bad[:120])[:-40] + raw(bad[120:]) + raw(words[:1])[:30]  # packet 119 is torn
+    packets = Packets()
+    got = np.concatenate([packets.feed(data[k : k + 1000]) for k in range(0, len(data), 1000)])
+    assert got[:, 1].tolist() == [k for k in range(200) if k not in (50, 119)]
+    assert packets.skipped == 5 + 96 + 56 and len(packets.rest) == 30
+
+
+def test_equal_gap_and_bit(words):
+    """Equal to the end; a gap is marked and costs what is not known; a wrong bit is found and named."""
+    live = watched(raw(words[:1300]), raw(words[1300:]))
+    assert live.replay.told() == "digital: equal over 2,500 samples"
+    assert (live.total, live.lost) == (2500, 0) and len(live.look(10**6).counter) == 1000  # the memory is bounded
+    assert live.look(10).counter.tolist() == list(range(2490, 2500))
+
+    live = watched(raw(words[:100]), raw(words[110:400]), raw(words[:50]), capacity=5000)
+    assert (live.lost, live.restarts) == (10, 1) and live.replay.equal == 100 + 50
+    assert [text for _, text in live.events if "gates" not in text] == [
+        "10 samples are missing",
+        "the numbers begin anew: the core was reset",
+    ]
+    assert live.look(5000).cuts.tolist() == [100, 390]
+
+    wrong = words.copy()
+    wrong[700, 11] ^= 4
+    live = watched(raw(wrong[:650]), raw(wrong[650:]))
+    assert live.replay.difference.startswith("block park, sample 700, signal i_d, bit 2: ")
+    assert live.replay.equal == 700 and live.total == 2500
+
+
+def test_command_on_a_file(words, tmp_path, capsys):
+    """A file that grows while it is read: every row, as CSV too; status 1 for a wrong bit."""
+    path = tmp_path / "capture.bin"
+    path.write_bytes(raw(words[:900]))
+
+    def grow():
+        time.sleep(0.3)
+        with open(path, "ab") as file:
+            file.write(raw(words[900:])[:-7])
+
+    thread = threading.Thread(target=grow)
+    thread.start()
+    command = ["watch", str(path), "--drive", str(PAPER), "--no-page", "--every", "0", "--seconds", "0.9"]
+    assert main([*command, "--csv", str(tmp_path / "rows.csv")]) == 0
+    thread.join()
+    assert "digital: equal over 2,499 samples" in capsys.readouterr().out
+    lines = (tmp_path / "rows.csv").read_text().splitlines()
+    column = lines[0].split(",").index('"i_q [A]"')
+    assert len(lines) == 2500
+    assert float(lines[1001].split(",")[column]) == pytest.approx(
+        np.int32(words[1000, 12]) * DRIVE.bases.current_a / 65536
+    )
+    assert main(["watch", str(tmp_path / "none.bin"), "--drive", str(PAPER), "--no-page"]) == 2
+    for wrong in ("tcp://host", "tcp://host:0", "tcp://:5"):
+        with pytest.raises(DriveError, match="expected tcp://HOST:PORT"):
+            source_of(wrong)
+
+
+def test_server_in_c(words, tmp_path):
+    """docs/software/telemetry_server.c: the packets arrive; a broken connection is made again, and its gap marked."""
+    if shutil.which("gcc") is None:
+        pytest.skip("gcc is not installed")
+    code = ROOT / "docs" / "software" / "telemetry_server.c"
+    subprocess.run(["gcc", "-O2", "-Wall", "-Wextra", "-Werror", code, "-o", tmp_path / "server"], check=True)
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    server = subprocess.Popen([tmp_path / "server", "-", str(port)], stdin=subprocess.PIPE)
+    live = Live(Tcp("127.0.0.1", port), 5000, LiveReplay(SET))
+
+    def until(total):
+        end = time.monotonic() + 20.0
+        while live.total < total and time.monotonic() < end:
+            live.pump()
+        return live.total
+
+    try:
+        while live.source.socket is None:
+            live.pump()
+        time.sleep(0.1)  # the server accepts
+        server.stdin.write(raw(words[:1000]))
+        server.stdin.flush()
+        assert until(1000) == 1000 and live.replay.equal == 1000
+        live.source.close()  # as a cable that is pulled
+        live.source.breaks += 1
+        time.sleep(0.1)
+        server.stdin.write(raw(words[1000:1200]))
+        server.stdin.flush()
+        time.sleep(0.3)
+        while live.source.socket is None:
+            live.pump()
+        time.sleep(0.1)
+        server.stdin.write(raw(words[1200:1500]))
+        server.stdin.close()
+        until(1300)
+        assert live.total + live.lost == 1500 and 0 < live.lost <= 200 and live.packets.skipped == 0
+        assert server.wait(10) == 0
+    finally:
+        server.kill()
+        live.source.close()
+
+
+def test_plotjuggler(words):
+    """The JSON that PlotJuggler's UDP server reads."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.settimeout(5.0)
+        sink = PlotJuggler(f"127.0.0.1:{listener.getsockname()[1]}", DRIVE)
+        live = Live(Pieces(raw(words[:500])), 1000, LiveReplay(SET), [sink])
+        live.pump()
+        said = [json.loads(listener.recv(4096)) for _ in range(20)]
+    assert [said[0]["timestamp"], said[-1]["timestamp"]] == pytest.approx([0.0, 499 * DRIVE.sample_time_s])
+    assert said[-1]["i_q"] == pytest.approx(np.int32(words[499, 12]) * DRIVE.bases.current_a / 65536)
+    sink.close()
+
+
+@pytest.mark.slow
+def test_page(words):
+    """The page is served and a session's curves hold the rows, its texts the replay; without the token nothing."""
+    from bokeh.client import pull_session
+    from bokeh.models import Div
+
+    live = Live(Pieces(raw(words)), 5000, LiveReplay(SET))
+    live.pump()
+    server, url = serve(Scene(live, DRIVE, None, "secret"), "127.0.0.1", 0)
+    thread = threading.Thread(target=server.io_loop.start)
+    thread.start()
+    try:
+        assert b"Fluxproof" in urlopen(url, timeout=10).read()
+        bare = url.split("?")[0]
+        session = pull_session(url=bare, arguments={"token": "secret"})
+        time.sleep(0.6)
+        session.pull()
+        line = session.document.select_one({"name": "i_q"})
+        assert len(line.data_source.data["x"]) > 100
+        assert max(line.data_source.data["x"]) == pytest.approx(
+            2499 * DRIVE.sample_time_s, abs=10 * DRIVE.sample_time_s
+        )
+        texts = [d.text for d in session.document.select({"type": Div})]
+        assert any("equal over 2,500 samples" in text for text in texts)
+        session.close()
+        session = pull_session(url=bare)
+        assert session.document.select_one({"name": "i_q"}) is None
+        session.close()
+    finally:
+        server.io_loop.add_callback(server.io_loop.stop)
+        thread.join()
+        server.stop()
+    assert token_for("127.0.0.1") is None and len(token_for("0.0.0.0")) >= 20
+    assert not allowed(Scene(live, DRIVE, None, "a"), {}) and allowed(Scene(live, DRIVE, None, None), {})
+
+
+def test_thinned_keeps_peaks():
+    """The curve of a view has its smallest and largest value."""
+    curve = np.zeros(40_003)
+    curve[12_345], curve[30_000] = 7.0, -9.0
+    x, y = thinned(np.arange(40_003), curve)
+    assert len(x) == len(y) <= 1000 and (y.max(), y.min()) == (7.0, -9.0) and COUNT == 24

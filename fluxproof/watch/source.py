@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where the bytes of the telemetry come from: a file that grows, or a server that sends what its DMA stores."""
+
+from __future__ import annotations
+
+import os
+import socket
+import time
+from typing import Protocol
+
+from golden_model.drive_keys import DriveError
+
+CHUNK = 1 << 18
+IDLE_S = 0.02
+RETRY_S, MOST_RETRY_S = 0.2, 2.0
+TCP = "tcp://"
+
+
+class Source(Protocol):
+    """A stream of bytes that may break and be resumed."""
+
+    breaks: int  # how often it began anew: bytes before and after do not belong together
+
+    def read(self) -> bytes:
+        """What has come, up to CHUNK bytes; empty after a short wait for nothing."""
+        ...
+
+    def close(self) -> None: ...
+
+
+def source_of(text: str) -> Source:
+    """The source that the command line names."""
+    if not text.startswith(TCP):
+        return GrowingFile(text)
+    host, _, port = text[len(TCP) :].rpartition(":")
+    if not host or not port.isdigit() or not 0 < int(port) < 65536:
+        raise DriveError(f"{text}: expected {TCP}HOST:PORT")
+    return Tcp(host.strip("[]"), int(port))
+
+
+class GrowingFile:
+    """A capture that another program writes; replaced or shortened, it is read from its begin again."""
+
+    def __init__(self, path: str) -> None:
+        self.path, self.breaks, self.at = path, 0, 0
+        try:
+            self.file = open(path, "rb", buffering=0)  # noqa: SIM115 - closed by close()
+        except OSError as error:
+            raise DriveError(f"{path}: cannot be read: {error.strerror or error}") from None
+
+    def read(self) -> bytes:
+        data = self.file.read(CHUNK) or b""
+        self.at += len(data)
+        if data:
+            return data
+        time.sleep(IDLE_S)
+        try:
+            now = os.stat(self.path)
+        except OSError:
+            return b""
+        mine = os.fstat(self.file.fileno())
+        if now.st_size < self.at or (now.st_dev, now.st_ino) != (mine.st_dev, mine.st_ino):
+            self.file.close()
+            self.file, self.at = open(self.path, "rb", buffering=0), 0  # noqa: SIM115
+            self.breaks += 1
+        return b""
+
+    def close(self) -> None:
+        self.file.close()
+
+
+class Tcp:
+    """A connection that is made again when it breaks, at intervals up to MOST_RETRY_S."""
+
+    def __init__(self, host: str, port: int) -> None:
+        self.host, self.port, self.breaks = host, port, 0
+        self.socket: socket.socket | None = None
+        self.wait_s, self.again_at = RETRY_S, 0.0
+
+    def read(self) -> bytes:
+        if self.socket is None and not self._connect():
+            time.sleep(IDLE_S)
+            return b""
+        assert self.socket is not None
+        try:
+            data = self.socket.recv(CHUNK)
+        except TimeoutError:
+            return b""
+        except OSError:
+            data = b""
+        if not data:
+            self.close()
+            self.breaks += 1
+        return data
+
+    def _connect(self) -> bool:
+        if time.monotonic() < self.again_at:
+            return False
+        try:
+            self.socket = socket.create_connection((self.host, self.port), timeout=1.0)
+            self.socket.settimeout(0.2)
+        except OSError:
+            self.again_at = time.monotonic() + self.wait_s
+            self.wait_s = min(2.0 * self.wait_s, MOST_RETRY_S)
+            return False
+        self.wait_s = RETRY_S
+        return True
+
+    def close(self) -> None:
+        if self.socket is not None:
+            self.socket.close()
+            self.socket = None
