@@ -236,6 +236,13 @@ def _check_names(path, header):
         raise RecordingError(f"{path}: header: first_state is not a state of the core") from None
 
 
+def _integers(values: list) -> list:
+    """The values; ValueError if one is no integer of a state."""
+    if not all(type(v) is int and -(2**62) < v < 2**62 for v in values):
+        raise ValueError("a state consists of integers")
+    return values
+
+
 def _state(nested):
     """fluxproof.State from nested lists of integers; None stays None."""
     if nested is None:
@@ -243,16 +250,14 @@ def _state(nested):
     defaults = fluxproof.State()
     parts = []
     for value, default in zip([*nested, *defaults[len(nested) :]], defaults, strict=True):  # of an older core: shorter
-        value = [*value, *default[len(value) :]] if isinstance(default, tuple) else value
-        several = value if isinstance(default, tuple) else [value]
-        if not all(type(v) is int and -(2**62) < v < 2**62 for v in several):
-            raise ValueError("a state consists of integers")
         if isinstance(default, tuple):
-            if len(value) != len(default):
+            inner: list = list(value)  # pyright: ignore[reportArgumentType]
+            inner += default[len(inner) :]
+            if len(inner) != len(default):
                 raise ValueError("wrong number of integers")
-            parts.append(type(default)(*value))
+            parts.append(type(default)(*_integers(inner)))
         else:
-            parts.append(value)
+            parts += _integers([value])
     return fluxproof.State(*parts)
 
 
