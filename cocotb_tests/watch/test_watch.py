@@ -18,7 +18,10 @@ from cocotb_tests.support.drives import PAPER
 from fluxproof.checkout import ROOT
 from fluxproof.command import main
 from fluxproof.cosim.scenarios import everything
+from fluxproof.diagnosis.example import motor
 from fluxproof.diagnosis.replay.capture import capture
+from fluxproof.plant import IMPOSED_SPEED
+from fluxproof.watch.explain import Explainer
 from fluxproof.watch.live import Live
 from fluxproof.watch.packets import Packets
 from fluxproof.watch.page import Scene, allowed, serve, thinned, token_for
@@ -35,16 +38,21 @@ DRIVE = drives.load(PAPER)
 SET = registers(DRIVE)
 
 
-@pytest.fixture(scope="module")
-def words():
-    """(2500, COUNT) uint32: the packets of a run that begins with a reset."""
-    samples, observed, _ = capture(DRIVE, SET, everything(DRIVE))
+def packed(samples, observed) -> np.ndarray:
+    """(n, COUNT) uint32: the packets of a run that begins with a reset."""
     names = fluxproof.Sample._fields
     rows = [
         pack(k, dict(zip(names, samples[k], strict=True)) | {n: observed[n][k] for n in PACKET})
         for k in range(len(samples))
     ]
     return np.array(rows, np.uint32)
+
+
+@pytest.fixture(scope="module")
+def words():
+    """The packets of 2500 samples."""
+    samples, observed, _ = capture(DRIVE, SET, everything(DRIVE))
+    return packed(samples, observed)
 
 
 class Pieces:
@@ -238,3 +246,19 @@ def test_thinned_keeps_peaks():
     curve[12_345], curve[30_000] = 7.0, -9.0
     x, y = thinned(np.arange(40_003), curve)
     assert len(x) == len(y) <= 1000 and (y.max(), y.min()) == (7.0, -9.0) and COUNT == 24
+
+
+@pytest.mark.slow
+def test_the_explanation_of_the_last_seconds_names_what_is_hidden(tmp_path):
+    """The example's motor, its telemetry as a stream: three differences that the regulators conceal."""
+    drive = drives.load(motor.DRIVE_FILE)
+    register_set, (path, options) = registers(drive), (tmp_path / "drive.toml", {"mode": IMPOSED_SPEED})
+    path.write_bytes(motor.DRIVE_FILE.read_bytes())
+    options |= {"machine": motor.machine(drive), "inverter": motor.inverter(), "sensors": motor.sensors(drive)}
+    samples, observed, _ = capture(drive, register_set, motor.scenario(drive), **options)
+    live = Live(Pieces(raw(packed(samples, observed))), len(samples), LiveReplay(register_set))
+    while live.source.pieces:
+        live.pump()
+    found = Explainer(live, drive, str(path), register_set, 1.0).explain()
+    assert found.verdict == "explained" and found.counter == len(samples) - 1, found
+    assert all(name in found.text for name in ("Dead time", "ncoder offset", "agnet flux")), found.text
