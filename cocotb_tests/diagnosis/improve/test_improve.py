@@ -82,7 +82,8 @@ def test_trims_cancel_the_sensor_errors(reverse, tmp_path):
     codes = sensor_params(dataclasses.replace(hardware, current_noise_a=0.0))
     for path, error in ((improved, 0.0), (old_trims.path, 1.0)):
         drive = drives.load(path)
-        (r, config, _), amp, volt = registers(drive), si_per_lsb("i_a", drive), si_per_lsb("u_dc", drive)
+        r, config, *_ = registers(drive)
+        amp, volt = si_per_lsb("i_a", drive), si_per_lsb("u_dc", drive)
         i = [2.0, -1.5, -0.5]
         seen = current_conditioning.step(
             *(current_code(codes, k, i[k], 0) for k in range(3)),
