@@ -234,7 +234,7 @@ def test_values_of_two_samples_are_no_snapshot(tmp_path):
 @pytest.mark.study
 @pytest.mark.parametrize("name", ["servo_24v", "hub_36v", "spindle_400v", "drone_24v"])
 def test_drive_files_are_commissioned(name, figure):
-    """With the encoder of the file; Hall sensors alone tell psi less well, see docs/commissioning.md."""
+    """With the encoder of the file; Hall sensors alone too, by the angle between their edges."""
     drive = load(DRIVES / f"{name}.toml")
     bus = SimulatedBus(drive, board_of(drive))
     found, _ = commission(bus, drive)
@@ -246,7 +246,7 @@ def test_drive_files_are_commissioned(name, figure):
     worst, psi = max(errors[key] for key in windings), errors["magnet_flux_wb"]
     figure(f"{name}: commissioned, largest error of R and L", round(worst, 2), "<= 3", "%", worst <= 3.0)
     figure(f"{name}: commissioned, error of psi", round(psi, 2), "<= 1", "%", psi <= 1.0)
-    assert worst < 3.0 and psi < (5.0 if drive.encoder.kind == "hall" else 1.0) and bus.peak_a < drive.current_limit_a
+    assert worst < 3.0 and psi < 1.0 and bus.peak_a < drive.current_limit_a
 
 
 @pytest.mark.study
