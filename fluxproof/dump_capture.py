@@ -8,6 +8,7 @@ integers, or the output of ``fluxproof registers --json``.  Registers that the f
 from __future__ import annotations
 
 import argparse
+import difflib
 import json
 from pathlib import Path
 
@@ -139,10 +140,16 @@ def _integer(value):
     return value.get("integer") if isinstance(value, dict) else value
 
 
+def _nearest(name: str, known) -> str:
+    """The known names that are most alike, in words."""
+    alike = difflib.get_close_matches(name, known, 3, 0.5)
+    return f"; the nearest are {', '.join(alike)}" if alike else "; known are those of `fluxproof registers --json`"
+
+
 def _check(path, kind, values, ranges) -> None:
     for name, value in values.items():
         if name not in ranges:
-            raise DriveError(f"{path}: {kind} {name!r} is unknown; known are {', '.join(ranges)}")
+            raise DriveError(f"{path}: {kind} {name[:40]!r} is unknown{_nearest(name, ranges)}")
         low, high = ranges[name]
         if type(value) is not int or not low <= value <= high:
             shown = json.dumps(value)[:40]

@@ -193,6 +193,7 @@ class Core:
     updates_per_period: int = whole(1, 2, "1: sampled and updated at the valley; 2: at the valley and the peak", 1)
     estimators: bool = flag("false: field-oriented control alone; flux_mode and the compensation have no effect", True)
     references: bool = flag("true: current references by a table of torque and flux limit, docs/speed_range.md", False)
+    ring_rows: int = whole(0, 2730, "telemetry rows of the ring in block RAM, 42 in a RAMB36; 0: none", 0)
     gate_active: int = whole(0, 1, "level of the gate pins at which a switch is on", 1)
     trip_active: int = whole(0, 1, "level of the pin trip that turns the gates off", 1)
     brake_active: int = whole(0, 1, "level of the pin brake at which the resistor is on", 1)

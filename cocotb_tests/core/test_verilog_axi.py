@@ -113,6 +113,7 @@ def test_axi_top_equals_vhdl_clock_by_clock(ghdl5, tmp_path, capsys):  # noqa: F
     wrong = differences(names, wanted, got)
     assert not wrong, "\n".join([f"{len(wrong)} differences", *wrong[:12]])
     still = [name for j, name in enumerate(names) if len({row[j] for row in wanted} - {None}) < 2]
-    assert not still, f"the stimulus never moves {still}"
+    # A read answers OKAY at every address.
+    assert still == ["s_axi_rresp"], f"the stimulus never moves {still}"
     with capsys.disabled():
         print(f"\nseed {seed}: {CLOCKS} clocks x {len(names)} outputs are equal; {undefined} values undefined")

@@ -57,7 +57,7 @@ def test_one_lsb_of_v_dead():
 def test_v_dead_never_stalls(eta):
     """A constant error of a quarter of an LSB of PU still moves the estimate, at the smallest step of the register."""
     eta_v = max(1, round(18 * eta * 2**19)) if eta > 2.0**-19 else 1
-    regs = {"k_lp": 0, "eta_v": eta_v, "gamma": 0, "zeta": 0, "v_thr": 0, "v_comp_max": 131071}
+    regs = {"k_lp": 0, "eta_v": eta_v, "gamma": 0, "zeta": 0, "v_thr": 0, "v_comp_max": 131071, "v_start": 0}
     regs |= {"i_learn": 0, "compensate": 0}
     state = v_dead_adaline.State()
     for _ in range(2000):

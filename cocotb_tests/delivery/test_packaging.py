@@ -66,7 +66,7 @@ def test_top_reports_unconnected_ports(tmp_path):
 def test_top_is_vhdl_93(tmp_path, top):
     """A block design takes no VHDL-2008 top as a module; what it instantiates is empty here, ports as they are."""
     package = (RTL / "generated" / "fluxproof_pkg.vhd").read_text()
-    shared = re.findall(r"^  constant \w+_W : positive := \d+;", package, re.MULTILINE)
+    shared = re.findall(r"^  constant \w+_W : (?:positive|natural) := \d+;", package, re.MULTILINE)
     shared += re.findall(r"^  type \w+ is record.*?end record \w+;", package, re.MULTILINE | re.DOTALL)
     context = "library ieee;\nuse ieee.std_logic_1164.all;\nuse ieee.numeric_std.all;\nuse work.fluxproof_pkg.all;\n"
     text = context.rsplit("use", 1)[0] + "package fluxproof_pkg is\n" + "\n".join(shared) + "\nend fluxproof_pkg;\n"

@@ -35,7 +35,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--every", type=float, default=10.0, metavar="S", help="renew the explanation (0: off)")
     parser.add_argument("--port", type=int, default=5006, help="of the page (default 5006; 0: any)")
     parser.add_argument("--listen", metavar="ADDRESS", default="127.0.0.1", help="of the page; a token guards others")
-    parser.add_argument("--no-page", action="store_true", help="only the line that tells the state, and the files")
+    parser.add_argument("--no-page", action="store_true", help="only the line of the state, and the files")
     parser.add_argument("--seconds", type=float, metavar="S", help="end after S seconds")
     parser.add_argument("--csv", metavar="FILE", help="all rows in SI units")
     parser.add_argument("--plotjuggler", metavar="HOST:PORT", help="JSON over UDP for PlotJuggler")

@@ -40,6 +40,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "trig",
         "rotor_frame",
         "current_circle",
+        "references",
+        "table_current",
         "speed_regulator",
         "current_regulators",
         "chord",

@@ -10,7 +10,14 @@ from fluxproof.cosim.entity import read_entity
 from fluxproof.files import write_text
 
 NAME = "core_with_telemetry"
-GENERICS = {"ADC_BITS": 16, "POSITION_BITS": 16, "CARRIER_HALF": 10000, "ESTIMATORS": 1, "DEPTH_BITS": 9}
+GENERICS = {
+    "ADC_BITS": 16,
+    "POSITION_BITS": 16,
+    "CARRIER_HALF": 10000,
+    "ESTIMATORS": 1,
+    "REFERENCES": 0,
+    "DEPTH_BITS": 9,
+}
 
 
 def write_top(rtl: Path = RTL) -> Path:
@@ -40,7 +47,7 @@ architecture test of {NAME} is
 begin
   core : entity work.fluxproof
     generic map (ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS, CARRIER_HALF => CARRIER_HALF,
-                 ESTIMATORS => ESTIMATORS)
+                 ESTIMATORS => ESTIMATORS, REFERENCES => REFERENCES)
     port map ({", ".join(f"{name} => {name}" for name in core)});
   stream : entity work.telemetry
     generic map (ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS, DEPTH_BITS => DEPTH_BITS)

@@ -65,7 +65,10 @@ def run(path) -> None:
     for name in written:
         assert not name.startswith("."), f"a temporary file {name}"
         assert (out / name).read_bytes().endswith(b"\n"), f"{name} is not whole"
-    failure = _printed(print_registers.run, argparse.Namespace(drive=str(drive), format="c", json=None)) or failure
+    failure = (
+        _printed(print_registers.run, argparse.Namespace(drive=str(drive), format="c", json=None, flux_map=None))
+        or failure
+    )
     if failure is not None:
         raise failure
 
