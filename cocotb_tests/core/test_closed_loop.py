@@ -115,5 +115,8 @@ def test_without_estimators(tmp_path):
 def test_timeline():
     """Every block starts when its last input is valid and has its declared latency, measured in the RTL."""
     measured = timeline.measure()
-    assert {row["instance"]: (row["first"], row["last"]) for row in measured["blocks"]} == fluxproof.schedule()
+    planned = fluxproof.schedule()
+    for label in ("references", "table_current"):  # the torque table, which the core has only with REFERENCES = 1
+        del planned[label]
+    assert {row["instance"]: (row["first"], row["last"]) for row in measured["blocks"]} == planned
     assert measured["sample_to_duty_clocks"] == fluxproof.SAMPLE_TO_DUTY <= 40
