@@ -135,6 +135,8 @@ def misfit(rows: Rows, at_current: bool = False, at_d_current: bool = False) -> 
         left = u - m.resistance_ohm * i_s.mean(axis=0) - mean_emf(flux_linkage(m, i), turn, rows.period)
     by = np.abs(at) if at_current else np.abs(i.real if at_d_current else u)
     large = by >= np.percentile(by, 75 if at_current or at_d_current else 50)
+    if not large.any():  # a column without a value
+        return np.inf
     size = float(np.median(np.abs(u[large])))
     return float(np.median(np.abs(left[large]))) / size if size > 0 else np.inf
 
