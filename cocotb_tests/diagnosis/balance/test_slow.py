@@ -11,7 +11,7 @@ import pytest
 from cocotb_tests.support.recordings.slow_logs import LEVELS, NOMINAL, Truth, log
 from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.balance.slow_stretches import Stretches, message_period, stretches, stretches_in_motion
-from fluxproof.diagnosis.balance.slow_view import alike, slow_view, view_of_points
+from fluxproof.diagnosis.balance.slow_view import alike, slow_view
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.ground.machine import steady_voltage
 from fluxproof.diagnosis.ground.nominal import load_nominal
@@ -141,12 +141,3 @@ def test_held_messages_are_not_balanced_in_motion():
         held = recording[name]
         recording.columns[name] = held[np.arange(len(held)) // 10 * 10]
     assert stretches_in_motion(recording, nominal) is None
-
-
-@pytest.mark.parametrize("currents, bent", [((0j, -180j), False), ((0j, -4j, -180j), False), ((0j, -90j, -180j), True)])
-def test_two_currents_show_no_bend_of_the_flux(currents, bent):
-    """Through two points any saturation is an inductance: it was named beside a drift, and certain."""
-    found = stretches(log(), NOMINAL)
-    found = replace(found, i=np.resize(np.array(currents), len(found)))
-    shown = view_of_points(found, log(), NOMINAL, CATALOGUE).visible(CATALOGUE)
-    assert ("saturation" in shown, "cross_saturation" in shown) == (bent, bent) and "inductance_q" in shown

@@ -10,16 +10,11 @@ FEW = 2 * EVERY  # with fewer dwells, every fourth block is
 
 
 def holdout_blocks(view) -> np.ndarray:
-    """(b,) bool: blocks held out of the fit: every fourth dwell, or every fourth block if there are few dwells.
-
-    The first and the last in time are fitted: no drift can be asked how it goes on.
-    """
+    """(b,) bool: blocks held out of the fit: every fourth dwell, or every fourth block if there are few dwells."""
     dwells = np.unique(view.run)
-    if len(dwells) < FEW:
-        return np.arange(len(view)) % EVERY == 2
-    ends = view.run[[np.argmin(view.course), np.argmax(view.course)]]
-    places = [next(n for n in (at, at - 1, at - 2) if dwells[n] not in ends) for at in range(2, len(dwells), EVERY)]
-    return np.isin(view.run, dwells[places])
+    if len(dwells) >= FEW:
+        return np.isin(view.run, dwells[2::EVERY])
+    return np.arange(len(view)) % EVERY == 2
 
 
 def held_out(views) -> np.ndarray:

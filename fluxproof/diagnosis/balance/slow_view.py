@@ -33,7 +33,6 @@ BIN_TEMP_K = 10.0  # of the winding
 NO_CURRENT = 0.02  # of rated current: an axis that never had more contains only noise
 MOST_ALIKE = 6  # largest number of stretches per operating point
 MOST_OF_ONE = 120  # the same of a recording with one operating point
-BENT = 3  # different currents: through fewer, every bend of the flux is a straight line
 
 # What no operating point shows.
 LACKS = frozenset({"harmonics"})
@@ -115,15 +114,6 @@ def slow_view(recording: Recording, nominal, catalogue: dict | None = None) -> S
     return view_of_points(found, recording, nominal, catalogue)
 
 
-def _currents(i, apart) -> int:
-    """Number of currents (b,) complex that are further apart than ``apart`` [A] from each other."""
-    centres: list[complex] = []
-    for current in i:
-        if all(abs(current - other) > apart for other in centres):
-            centres.append(complex(current))
-    return len(centres)
-
-
 def view_of_points(found: Stretches, recording, nominal, catalogue: dict | None = None) -> SlowView:
     """The same for given stretches."""
     if alone(found, nominal):  # all that it can show is its drift
@@ -134,8 +124,6 @@ def view_of_points(found: Stretches, recording, nominal, catalogue: dict | None 
     span = 0.0 if "time" in recording.lacks else float(recording["t"][-1] - recording["t"][0])
     recording.meta.setdefault("notes", []).extend(found.notes)
     shown = frozenset() if np.isfinite(torque).any() else frozenset({"torque"})
-    if _currents(found.i, k.POINT * nominal.machine.rated_current_a) < BENT:
-        shown |= {"bend"}
     lacks, course = LACKS | recording.lacks | shown, found.t[order] / max(span, 1e-9)
     if "time" in lacks and np.ptp(found.temp[order]) > BIN_TEMP_K:  # rows of a table from the coldest to the hottest
         lacks, course = lacks - {"time"}, (found.temp[order] - found.temp.min()) / np.ptp(found.temp)

@@ -65,5 +65,5 @@ EFFECT = CrossSaturation(
     signature="order 0, in proportion to the speed: omega i_q^2 on the q axis, even in i_q; omega i_d i_q on d",
     separated_by="a grid of i_d and i_q that includes i_q = 0",
     parameters=(Parameter("cross_saturation_wb_per_a2", "Wb/A2", "c at rated i_q", "coefficient"),),
-    needs=("voltage", "bend"),
+    needs=("voltage",),
 )

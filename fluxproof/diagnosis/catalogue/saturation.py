@@ -121,5 +121,5 @@ EFFECT = Saturation(
         Parameter("psi_q_change_at_rated_wb", "Wb", "flux linkage at rated i_q minus L_q i_q", "psi_q at rated i_q"),
         Parameter("psi_d_change_at_rated_wb", "Wb", "flux linkage at rated i_d minus L_d i_d", "psi_d at rated i_d"),
     ),
-    needs=("voltage", "bend"),
+    needs=("voltage",),
 )

@@ -2,8 +2,8 @@
 """Rows at the voltage limit: the references ask for more than the bus can give, so that they are not at the machine.
 
 An inverter gives at most u_dc / sqrt(3) without overmodulation.  A regulator that is not limited asks for more while
-the current lags behind.  References that lie beyond in most rows have another unit or scale, which others
-find.
+the current lags behind.  References that lie beyond in most rows have another unit or scale, which other
+checks find.
 """
 
 from __future__ import annotations

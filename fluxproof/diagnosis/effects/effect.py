@@ -24,7 +24,6 @@ NEEDS = {
     "angle": "an angle that was measured, not taken from the voltages",
     "inverter": "an inverter that switches",
     "current": "measured currents",
-    "bend": "three different currents",
     "voltage": "voltages of the control or of the terminals",
     "torque": "a torque transducer, or a shaft whose acceleration is seen",
 }
