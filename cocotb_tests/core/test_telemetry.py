@@ -19,18 +19,17 @@ from cocotb_tests.support.recordings.dumps import OWNERS, first_row, recording
 from fluxproof import dump_capture
 from fluxproof.checkout import ROOT, RTL
 from fluxproof.command import main
-from fluxproof.commission.bus import BusError
-from fluxproof.commission.ring import read_ring, ring_state
 from fluxproof.cosim import ghdl
 from fluxproof.cosim.golden_loop import run_controller
 from fluxproof.cosim.scenarios import everything
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.replay import digital
 from fluxproof.diagnosis.replay.capture import capture as golden_capture
+from fluxproof.diagnosis.replay.capture import packets
 from fluxproof.diagnosis.replay.telemetry_stream import SIZE, parse, read_capture, write_piece
 from golden_model import drive as drives
 from golden_model import fluxproof
-from golden_model.io import register_map, telemetry_ring, telemetry_words
+from golden_model.io import telemetry_words
 from golden_model.io.telemetry_words import COUNT, FIELDS, HEADER_WORD, LAYOUT, PACKET, pack
 from golden_model.registers import registers
 from scripts import generate, generate_telemetry
@@ -63,17 +62,7 @@ def folder():
 def golden():
     """(words (2500, COUNT) uint32, samples, observed) of the scenario in which everything happens, without RTL."""
     samples, observed, _ = golden_capture(DRIVE, SET, everything(DRIVE))
-    return packed(samples, observed), samples, observed
-
-
-def packed(samples, observed):
-    """The packets of a run, (n, COUNT) uint32, numbered from 0."""
-    names = fluxproof.Sample._fields
-    rows = [
-        pack(k, dict(zip(names, samples[k], strict=True)) | {n: observed[n][k] for n in PACKET})
-        for k in range(len(samples))
-    ]
-    return np.array(rows, np.uint32)
+    return packets(samples, observed), samples, observed
 
 
 def raw(words) -> bytes:
@@ -190,7 +179,7 @@ def test_capture_started_before_or_during_the_run(start, whole, tmp_path, capsys
     longer = {name: np.concatenate((held[name], v)) for name, v in first.items()}
     samples, observed, _ = golden_capture(DRIVE, SET, dataclasses.replace(scenario, **longer))
     path = tmp_path / "capture.bin"
-    path.write_bytes(raw(packed(samples, observed)[start:]))
+    path.write_bytes(raw(packets(samples, observed)[start:]))
     assert main(["dump", str(path), "--drive", str(PAPER)]) == 0
     assert ("begins with the gates off" if whole else "begins while the drive runs") in capsys.readouterr().out
     got, notes = digital.replay(recording(tmp_path / "capture.fluxdump"))
@@ -361,111 +350,3 @@ int main(void)
     (piece,) = parse(raw(words[::100])).pieces
     wanted = np.stack([piece.fields[name] for name in FIELDS], axis=1)
     np.testing.assert_array_equal(np.array(done.stdout.split(), np.int64).reshape(wanted.shape), wanted)
-
-
-class RingBus:
-    """The registers of a core whose ring is the golden twin's, as a bus; rows go in by ``record``."""
-
-    def __init__(self, rows):
-        self.rows, self.state, self.out = rows, telemetry_ring.State(), (0,) * 7
-        self.inputs = dict.fromkeys(telemetry_ring.Inputs._fields, 0)
-        self.clock()
-
-    def clock(self, **values):
-        self.state, self.out = telemetry_ring.step(
-            self.state, *(self.inputs | values).values(), self.rows, telemetry_words.COUNT
-        )
-
-    def record(self, words, **values):
-        for row in words.tolist():
-            for word in row:
-                self.clock(row_valid=1, row_word=word, **values)
-            for _ in range(3):
-                self.clock(**values)
-
-    def write(self, name, value):
-        if name in ("ring_arm", "ring_stop"):
-            self.clock(**{name: value})
-        else:
-            self.inputs[name] = value
-        self.clock()
-
-    def read(self, name):
-        shown = dict(zip((p.name for p in telemetry_ring.BLOCK.outputs), self.out, strict=True))
-        if name != "ring_state":
-            return shown[name]
-        return sum(shown[n] << bit for n, bit in register_map._RING_STATE.items())
-
-
-def test_ring_to_dump(golden, tmp_path, monkeypatch):
-    """A trip leaves the rows before it and those asked for after it: dump --ring writes what a capture gives."""
-    words, _, _ = golden
-    bus = RingBus(42)
-    with pytest.raises(BusError, match="not armed"):
-        read_ring(bus)
-    bus.write("ring_faults", 1 << 16)
-    bus.write("ring_after", 5)
-    bus.write("ring_arm", 1)
-    bus.record(words[:900])
-    with pytest.raises(BusError, match="still records"):
-        read_ring(bus)
-    bus.record(words[900:1000], tripped=1)  # the first row that shows it is 900
-    assert read_ring(bus) == raw(words[864:906])
-    assert ring_state(bus) == {"ring_recording": 0, "ring_ended": 1, "ring_full": 1, "ring_cause": telemetry_ring.TRIP}
-
-    monkeypatch.setattr(dump_capture, "UioBus", lambda path: bus)
-    (tmp_path / "capture.bin").write_bytes(raw(words[864:906]))
-    for given in (["/dev/uio0", "--ring"], [str(tmp_path / "capture.bin")]):
-        command = ["dump", *given, "--drive", str(PAPER), "-o", str(tmp_path / f"{len(given)}.fluxdump")]
-        assert main(command) == 0
-    assert (tmp_path / "1.fluxdump").read_bytes() == (tmp_path / "2.fluxdump").read_bytes()
-    got, notes = digital.replay(recording(tmp_path / "2.fluxdump"))
-    assert got.first_difference is None and "42 samples could not be replayed" in notes[0]
-
-
-def test_ring_in_c(golden, tmp_path):
-    """docs/software/ring.c reads a full ring from its oldest row on, and one that is not full from address 0."""
-    if shutil.which("gcc") is None:
-        pytest.skip("gcc is not installed")
-    words, _, _ = golden
-    rows = 7
-    held = np.roll(words[:rows], 3, axis=0)  # the oldest row is the fourth
-    bus = f"""
-#include "fluxproof_bus.h"
-#include "fluxproof_registers.h"
-#include "ring.h"
-#include <stddef.h>
-#define AT(name) ((uint32_t)offsetof(fluxproof_t, name))
-static const uint32_t ram[] = {{ {", ".join(f"{w}u" for w in held.ravel().tolist())} }};
-static uint32_t address, state, armed[3];
-bool bus_write(uint32_t offset, uint32_t value)
-{{
-    if (offset == AT(ring_address)) address = value;
-    if (offset == AT(ring_faults)) armed[0] = value;
-    if (offset == AT(ring_after)) armed[1] = value;
-    if (offset == AT(ring_arm)) armed[2] = value;
-    return true;
-}}
-bool bus_read(uint32_t offset, uint32_t *value)
-{{
-    *value = offset == AT(ring_depth) ? {rows} : offset == AT(ring_next) ? {3 * COUNT} :
-             offset == AT(ring_data) ? ram[address] : state;
-    return true;
-}}
-int main(void)
-{{
-    if (!ring_start(RING_TRIP, 5) || armed[0] != RING_TRIP || armed[1] != 5 || armed[2] != 1) return 1;
-    state = FLUXPROOF__RING_STATE__RING_RECORDING_bm;
-    if (ring_save(stdout) != -1) return 2;
-    state = FLUXPROOF__RING_STATE__RING_ENDED_bm;
-    if (ring_save(stdout) != 3) return 3;
-    state |= FLUXPROOF__RING_STATE__RING_FULL_bm;
-    return ring_save(stdout) == {rows} ? 0 : 4;
-}}
-"""
-    (tmp_path / "main.c").write_text(bus)
-    software = ROOT / "docs" / "software"
-    command = ["gcc", "-Wall", "-Wextra", "-Werror", f"-I{software}", "-o", "ring", "main.c", software / "ring.c"]
-    subprocess.run(command, cwd=tmp_path, check=True)
-    done = subprocess.run([tmp_path / "ring"], capture_output=True, check=True)
-    assert done.stdout == raw(held[:3]) + raw(words[:rows])

@@ -19,7 +19,7 @@ from fluxproof.checkout import ROOT
 from fluxproof.command import main
 from fluxproof.cosim.scenarios import everything
 from fluxproof.diagnosis.example import motor
-from fluxproof.diagnosis.replay.capture import capture
+from fluxproof.diagnosis.replay.capture import capture, packets
 from fluxproof.plant import IMPOSED_SPEED
 from fluxproof.watch.explain import Explainer
 from fluxproof.watch.live import Live
@@ -29,30 +29,19 @@ from fluxproof.watch.replay import LiveReplay
 from fluxproof.watch.sinks import PlotJuggler
 from fluxproof.watch.source import Tcp, source_of
 from golden_model import drive as drives
-from golden_model import fluxproof
 from golden_model.drive_keys import DriveError
-from golden_model.io.telemetry_words import COUNT, PACKET, pack
+from golden_model.io.telemetry_words import COUNT
 from golden_model.registers import registers
 
 DRIVE = drives.load(PAPER)
 SET = registers(DRIVE)
 
 
-def packed(samples, observed) -> np.ndarray:
-    """(n, COUNT) uint32: the packets of a run that begins with a reset."""
-    names = fluxproof.Sample._fields
-    rows = [
-        pack(k, dict(zip(names, samples[k], strict=True)) | {n: observed[n][k] for n in PACKET})
-        for k in range(len(samples))
-    ]
-    return np.array(rows, np.uint32)
-
-
 @pytest.fixture(scope="module")
 def words():
     """The packets of 2500 samples."""
     samples, observed, _ = capture(DRIVE, SET, everything(DRIVE))
-    return packed(samples, observed)
+    return packets(samples, observed)
 
 
 class Pieces:
@@ -256,7 +245,7 @@ def test_the_explanation_of_the_last_seconds_names_what_is_hidden(tmp_path):
     path.write_bytes(motor.DRIVE_FILE.read_bytes())
     options |= {"machine": motor.machine(drive), "inverter": motor.inverter(), "sensors": motor.sensors(drive)}
     samples, observed, _ = capture(drive, register_set, motor.scenario(drive), **options)
-    live = Live(Pieces(raw(packed(samples, observed))), len(samples), LiveReplay(register_set))
+    live = Live(Pieces(raw(packets(samples, observed))), len(samples), LiveReplay(register_set))
     while live.source.pieces:
         live.pump()
     found = Explainer(live, drive, str(path), register_set, 1.0).explain()

@@ -22,11 +22,10 @@ import numpy as np
 
 from fluxproof.checkout import BUILD, DRIVES
 from fluxproof.cosim.scenarios import everything
-from fluxproof.diagnosis.replay.capture import capture
+from fluxproof.diagnosis.replay.capture import capture, packets
 from fluxproof.files import write_json
 from golden_model import drive as drives
-from golden_model import fluxproof
-from golden_model.io.telemetry_words import COUNT, COUNTER, HEADER_WORD, LAYOUT, PACKET
+from golden_model.io.telemetry_words import LAYOUT
 from golden_model.registers import registers
 
 DRIVE_FILE = DRIVES / "paper001.toml"
@@ -34,20 +33,13 @@ MOST_MB = 500.0
 WRONG_AT, WRONG_WORD, WRONG_BIT = 40_000, LAYOUT["i_q"].word, 3
 
 
-def packets(count: int) -> np.ndarray:
+def stream(count: int) -> np.ndarray:
     """(count, COUNT) uint32: closed loops one after the other on one core, numbered from the reset on."""
     drive = drives.load(DRIVE_FILE)
     register_set, state, parts, done = registers(drive), None, [], 0
     while done < count:
         samples, observed, state = capture(drive, register_set, everything(drive), state=state)
-        fields = dict(zip(fluxproof.Sample._fields, samples.T, strict=True)) | {n: observed[n] for n in PACKET}
-        words = np.zeros((len(samples), COUNT), np.uint32)
-        words[:, 0] = HEADER_WORD
-        fields[COUNTER] = done + np.arange(len(samples))
-        for name, field in LAYOUT.items():
-            if name in fields:
-                words[:, field.word] |= ((fields[name] & ((1 << field.width) - 1)) << field.lsb).astype(np.uint32)
-        parts.append(words)
+        parts.append(packets(samples, observed, done))
         done += len(samples)
     return np.concatenate(parts)[:count]
 
@@ -124,13 +116,13 @@ def main() -> int:
         print(figures[-1], flush=True)
 
     for rate in (10_000, 20_000):
-        rows = packets(round(rate * seconds))
+        rows = stream(round(rate * seconds))
         got, name = watch(rows, rate), f"{rate // 1000} kHz for {seconds:g} s"
         note(f"{name}: rows", got["rows"], len(rows), "1", got["rows"] == len(rows))
         note(f"{name}: rows lost", got["lost"], 0, "1", got["lost"] == 0)
         note(f"{name}: samples equal in every bit", got["equal"], len(rows), "1", got["equal"] == len(rows))
         note(f"{name}: largest memory", round(got["memory"]), MOST_MB, "MB", got["memory"] < MOST_MB)
-    rows = packets(WRONG_AT + 20_000)
+    rows = stream(WRONG_AT + 20_000)
     rows[WRONG_AT, WRONG_WORD] ^= np.uint32(1 << WRONG_BIT)
     said = watch(rows, 10_000)["said"]
     wanted = f"sample {WRONG_AT}, signal i_q, bit {WRONG_BIT}"

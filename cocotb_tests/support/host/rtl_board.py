@@ -17,7 +17,7 @@ class RtlBoard(Board):
     def __init__(self, drive, trip_at: float | None = None):
         super().__init__(drive, trip_at)
         config = registers(drive).config
-        generics = {**config._asdict(), "clock_hz": round(drive.core.clock_hz)}
+        generics = {**config._asdict(), "clock_hz": round(drive.core.clock_hz), "ring_rows": drive.core.ring_rows}
         self.core = VerilatedCore({n.upper(): v for n, v in generics.items()}, top="fluxproof_axi")
         self.core.set_many({"m_axis_tready": 1, "s_axi_wstrb": 15, "s_axi_bready": 1, "s_axi_rready": 1})
         self.core.reset()

@@ -24,6 +24,7 @@ from fluxproof.plant import (
 )
 from fluxproof.plant import layout as L
 from golden_model import fluxproof
+from golden_model.io.telemetry_words import COUNT, COUNTER, HEADER, HEADER_WORD, LAYOUT, PACKET
 
 
 def capture(drive, register_set, scenario: Scenario, machine=None, inverter=None, sensors: Sensors | None = None,
@@ -72,3 +73,13 @@ def _capture(
         duties[1] = seen.compare_b / config.carrier_half
         duties[2] = seen.compare_c / config.carrier_half
     return state
+
+
+def packets(samples, observed, first: int = 0) -> np.ndarray:
+    """The telemetry of a capture as the core sends it, (n, COUNT) uint32, numbered from ``first`` on."""
+    fields = dict(zip(fluxproof.Sample._fields, samples.T, strict=True)) | {name: observed[name] for name in PACKET}
+    fields |= {HEADER: np.full(len(samples), HEADER_WORD), COUNTER: first + np.arange(len(samples))}
+    words = np.zeros((len(samples), COUNT), np.uint32)
+    for name, field in LAYOUT.items():
+        words[:, field.word] |= ((fields[name] & ((1 << field.width) - 1)) << field.lsb).astype(np.uint32)
+    return words
