@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.needs import skip_without_ghdl5
-from fluxproof.hil.beside_plant import HELD, OWN, beside_plant
 from fluxproof.hil.registers import machine_of, motor_registers, motor_scale
 from fluxproof.plant.pmsm import Machine
 from golden_model.motor.motor_model import Shown
 from studies.hil import closed_loop, equal
+from studies.hil.beside_plant import HELD, OWN, beside_plant
 from studies.hil.drive import CLOCK_HZ, CURRENT_A, SERVO, SWITCHES, U_DC_V, ride, servo
 from studies.hil.plant import ANGLE_DEG, CURRENT_PERCENT, TORQUE_PERCENT, differences
 

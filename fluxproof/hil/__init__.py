@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The motor in the FPGA: registers and tables from a machine's data, its model beside the plant; docs/hil.md."""
+"""The motor in the FPGA: registers and tables from a machine's data; docs/hil.md."""

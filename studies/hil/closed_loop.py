@@ -17,7 +17,6 @@ from fluxproof.cosim.closed_loop import gate_words
 from fluxproof.cosim.flat import FLAT
 from fluxproof.cosim.golden_clock import GoldenClock
 from fluxproof.cosim.verilated import VerilatedCore
-from fluxproof.hil.beside_plant import follow
 from fluxproof.hil.registers import Scale, motor_registers, motor_scale, motor_tables
 from golden_model import fluxproof
 from golden_model.drive import Drive, load
@@ -25,6 +24,7 @@ from golden_model.motor import motor_model, motor_sensors, motor_shaft
 from golden_model.motor.motor_model import STEP
 from golden_model.registers import RegisterSet, registers
 from golden_model.units import from_si
+from studies.hil.beside_plant import follow
 from studies.hil.drive import SERVO, SWITCHES
 from studies.hil.equal import write_tables
 from studies.hil.figure import least, most

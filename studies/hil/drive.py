@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 
-from fluxproof.hil.beside_plant import Control, Drive, Ride
 from fluxproof.hil.registers import motor_scale
 from fluxproof.plant.inverter import Inverter
 from fluxproof.plant.pmsm import Harmonic, Machine
+from studies.hil.beside_plant import Control, Drive, Ride
 
 # The Teknic motor of docs/drives/servo_24v.toml; a salient, saturating rotor, harmonics and cogging are assumed
 SERVO = Machine(

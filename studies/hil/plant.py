@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from fluxproof.hil.beside_plant import COLUMNS, HELD, OWN, Both, beside_plant
+from studies.hil.beside_plant import COLUMNS, HELD, OWN, Both, beside_plant
 from studies.hil.drive import RATED_A, RATED_NM, ride, servo
 from studies.hil.figure import most
 

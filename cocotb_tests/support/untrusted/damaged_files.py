@@ -31,23 +31,34 @@ class Canary:
 
 def damaged_files(folder) -> dict[str, tuple[object, str]]:
     """{name: (path, REFUSED or EITHER)} of damaged files, written into ``folder``."""
-    files = {}
-    whole = {suffix: write(folder / f"whole{suffix}", made(800)).read_bytes() for suffix in SUFFIXES}
-    whole["73.mat"] = write_mat73(folder / "whole73.mat", made(800)).read_bytes()
+    files = changed_files(folder)
+    add = _into(folder, files)
+    _texts(add)
+    _values(add)
+    _hostile(add, folder, files)
+    return files
 
+
+def changed_files(folder) -> dict[str, tuple[object, str]]:
+    """Those of them that were a recording: cut, changed, or under another format's name."""
+    files, whole = {}, {suffix: write(folder / f"whole{suffix}", made(800)).read_bytes() for suffix in SUFFIXES}
+    whole["73.mat"] = write_mat73(folder / "whole73.mat", made(800)).read_bytes()
     whole[".dump"] = dump(folder / "whole.dump")[0].read_bytes()
+    add = _into(folder, files)
+    _cut_and_flipped(add, whole)
+    _wrong_names(add, whole)
+    return files
+
+
+def _into(folder, files):
+    """A function that writes a file to ``folder`` and enters it in ``files``."""
 
     def add(name, content, expected=EITHER):
         path = folder / name
         path.write_bytes(content.encode() if isinstance(content, str) else content)
         files[name] = path, expected
 
-    _cut_and_flipped(add, whole)
-    _wrong_names(add, whole)
-    _texts(add)
-    _values(add)
-    _hostile(add, folder, files)
-    return files
+    return add
 
 
 def _cut_and_flipped(add, whole) -> None:
