@@ -7,6 +7,7 @@ from golden_model.drive_keys import DriveError
 from golden_model.fluxproof import SAMPLE_INTERVAL
 from golden_model.formats import PU, VECTOR
 from golden_model.front_ends import check_converters, check_encoder
+from golden_model.motion import check_position
 
 CARRIER_HALF_RANGE = (8, 32767)  # generic CARRIER_HALF of rtl/fluxproof.vhd
 ON_OF_DEAD, ON_S = 0.05, 20e-9  # shortest time that a switch is on: of the dead time, and at least
@@ -222,4 +223,5 @@ def _protection(drive):
 RULES = (
     _sample_time, _sampling, _carrier, _pulses, _samples_per_turn, _voltage, _current, _flux, _codes, _speed_loop,
     _current_loop, _flux_loop, _adaline_steps, _protection, check_encoder, check_converters,
+    check_position,
 )  # fmt: skip
