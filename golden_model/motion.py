@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """[position] of drive.toml and the registers of the position loop, see docs/position.md.
 
-What is not given is ordinary: a bandwidth of a quarter of the speed loop's, the rated speed, the acceleration of the
-rated torque, a jerk that builds it up in 8 samples, a dead band of one count of the encoder, no stops.
+What is not given is ordinary: a bandwidth of a quarter of the speed loop's, the rated speed, the acceleration of 80 % of
+the rated torque (friction and the regulator need the rest), built up in 8 samples, a dead band of one count of the
+encoder, no stops.
 """
 
 import math
@@ -15,6 +16,7 @@ from golden_model.formats import PU
 from golden_model.scale_entry import Entry, base_keys
 from golden_model.units import TURN_RAD
 
+OF_RATED = 0.8  # torque of the acceleration
 OF_SPEED_LOOP = 4.0  # speed bandwidth over position bandwidth
 SPEED_MARGIN = 1.25  # largest speed reference over that of the trajectory
 JERK_BITS_MOST, LEAD_MOST = 5, 7
@@ -26,7 +28,9 @@ class Position:
 
     bandwidth_hz: float | None = positive("Hz", "position loop; a quarter of speed_bandwidth_hz if none", None)
     speed_rad_s: float | None = positive("rad/s", "largest of a move; rated speed if none", None)
-    acceleration_rad_s2: float | None = positive("rad/s2", "largest of a move; of the rated torque if none", None)
+    acceleration_rad_s2: float | None = positive(
+        "rad/s2", "largest of a move; of 80 % of the rated torque if none", None
+    )
     jerk_rad_s3: float | None = positive("rad/s3", "largest of a move; acceleration within 8 samples if none", None)
     dead_band_counts: float = not_negative("1", "error that is left at rest, counts of the encoder", 1.0, most=1000.0)
     stop_low_rad: float | None = real("rad", "soft end stop", None)
@@ -46,12 +50,12 @@ def check_position(drive):
         raise DriveError("[core] position_loop needs [control] speed_bandwidth_hz or [position] bandwidth_hz")
 
 
-def torque_per_acceleration(drive):
-    """Torque [Nm], or current [A] without the torque table, per angular acceleration of the shaft [s2/rad]."""
+def fed_forward(drive):
+    """What a torque [Nm] is as output of the speed regulator: itself with the torque table, else a current [A]."""
     m = drive.machine
     if drive.core.references:
-        return m.inertia_kgm2
-    return m.inertia_kgm2 / (1.5 * m.pole_pairs * m.magnet_flux_wb) if m.magnet_flux_wb else 0.0
+        return 1.0
+    return 1.0 / (1.5 * m.pole_pairs * m.magnet_flux_wb) if m.magnet_flux_wb else 0.0
 
 
 def limits(drive):
@@ -62,8 +66,10 @@ def limits(drive):
     if acceleration is None:
         rated = 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a
         if not rated or not m.inertia_kgm2:
-            raise DriveError("[position] acceleration_rad_s2 is missing: no magnet flux or no inertia to derive it from")
-        acceleration = rated / m.inertia_kgm2
+            raise DriveError(
+                "[position] acceleration_rad_s2 is missing: no magnet flux or no inertia to derive it from"
+            )
+        acceleration = OF_RATED * rated / m.inertia_kgm2
     if p.jerk_rad_s3 is None:
         return speed, acceleration, 0
     samples = 2.0 * acceleration / (p.jerk_rad_s3 * t_s)
@@ -75,10 +81,10 @@ def limits(drive):
 
 
 def torque_lead(drive):
-    """Samples from a torque reference to the torque: output delay and the current loop's time constant."""
+    """Samples by which the current is late at a ramp, and the one over which position differences take a torque."""
     if drive.position.torque_lead_samples is not None:
         return drive.position.torque_lead_samples
-    lag = drive.control.delay_samples + 1.0 / (TURN_RAD * drive.control.current_bandwidth_hz * drive.sample_time_s)
+    lag = 1.0 + 1.0 / (TURN_RAD * drive.control.current_bandwidth_hz * drive.sample_time_s)
     return min(round(lag), LEAD_MOST)
 
 
@@ -118,7 +124,12 @@ def position_loop(drive):
         yield Entry(name, turns, "turn", 1.0, f"[position] {name}_rad")
     unit, one = ("Nm", drive.torque_base_nm) if drive.core.references else ("A", drive.bases.current_a)
     keys = "[machine] inertia_kgm2, magnet_flux_wb, pole_pairs"
-    yield Entry("k_inertia", on * torque_per_acceleration(drive), f"{unit} s2/rad", one * t_s * t_s / TURN_RAD, keys)
+    share = on * fed_forward(drive)
+    yield Entry("k_inertia", share * m.inertia_kgm2, f"{unit} s2/rad", one * t_s * t_s / TURN_RAD, keys)
+    keys = "[machine] viscous_friction_nms, magnet_flux_wb, pole_pairs"
+    yield Entry("k_viscous", share * m.viscous_friction_nms, f"{unit} s/rad", one * t_s / TURN_RAD, keys)
+    keys = "[machine] coulomb_friction_nm, magnet_flux_wb, pole_pairs"
+    yield Entry("coulomb", share * m.coulomb_friction_nm, unit, one, keys)
 
 
 def _step(speed, acceleration, bits, t_s):

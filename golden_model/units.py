@@ -62,6 +62,7 @@ _ONE_OF_REGISTER = {
     "omega_0": "1/T_s",
     "position_kp": "omega_base/(2*pi*pole_pairs)",
     "move_speed": "2*pi/T_s",
+    "k_viscous": "the base of the regulator's output*T_s/(2*pi)",
     **dict.fromkeys(("dead_time", "min_pulse", "watchdog"), "1/clock_hz"),
     **dict.fromkeys(("runaway_samples", "stall_samples", "emf_samples", "heartbeat"), "T_s"),
 }

@@ -225,7 +225,7 @@ begin
                 move_speed => settings.move_speed, move_step => settings.move_step, jerk_bits => settings.jerk_bits,
                 use_stops => settings.use_stops, stop_low => settings.stop_low, stop_high => settings.stop_high,
                 torque_lead => settings.torque_lead, k_speed => settings.k_speed, k_filter => settings.k_filter,
-                k_inertia => settings.k_inertia,
+                k_inertia => settings.k_inertia, k_viscous => settings.k_viscous, coulomb => settings.coulomb,
                 out_valid => open, position_ref => position_ref, omega_ff => omega_ff, torque_ff => torque_ff,
                 at_rest => at_rest);
   else generate

@@ -934,6 +934,18 @@ extern "C" {
 #define FLUXPROOF__K_INERTIA__VALUE_bw 24
 #define FLUXPROOF__K_INERTIA__VALUE_reset 0x0
 
+// reg - fluxproof::k_viscous
+#define FLUXPROOF__K_VISCOUS__VALUE_bm 0xffffff
+#define FLUXPROOF__K_VISCOUS__VALUE_bp 0
+#define FLUXPROOF__K_VISCOUS__VALUE_bw 24
+#define FLUXPROOF__K_VISCOUS__VALUE_reset 0x0
+
+// reg - fluxproof::coulomb
+#define FLUXPROOF__COULOMB__VALUE_bm 0xffffffff
+#define FLUXPROOF__COULOMB__VALUE_bp 0
+#define FLUXPROOF__COULOMB__VALUE_bw 32
+#define FLUXPROOF__COULOMB__VALUE_reset 0x0
+
 // reg - fluxproof::shaft_position
 #define FLUXPROOF__SHAFT_POSITION__VALUE_bm 0xffffffff
 #define FLUXPROOF__SHAFT_POSITION__VALUE_bp 0
@@ -1659,7 +1671,9 @@ typedef struct {
     uint32_t stop_low;
     uint32_t stop_high;
     uint32_t k_inertia;
-    uint8_t RESERVED_2b4_2df[0x2c];
+    uint32_t k_viscous;
+    uint32_t coulomb;
+    uint8_t RESERVED_2bc_2df[0x24];
     uint32_t shaft_position;
     uint32_t position_error;
     uint8_t RESERVED_2e8_3bf[0xd8];

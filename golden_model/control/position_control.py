@@ -79,7 +79,12 @@ def reference(v, state):
 
 def bound(_v, _state):
     """Rounding of the proportional part and of the sum."""
-    return {"shaft_position": 0.0, "position_error": 0.0, "omega_asked": INTEGRAL.lsb / 2 + PU.lsb / 2, "regulates": 0.0}
+    return {
+        "shaft_position": 0.0,
+        "position_error": 0.0,
+        "omega_asked": INTEGRAL.lsb / 2 + PU.lsb / 2,
+        "regulates": 0.0,
+    }
 
 
 def stimuli(rng, config):

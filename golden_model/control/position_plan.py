@@ -7,13 +7,14 @@
     faster   if speed + move_step <= move_speed  and  stop + 2*speed + move_step <= room
     as fast  if speed             <= move_speed  and  stop + speed               <= room
     slower   else
-    at speed zero: the rest of the way, room <= move_step, in one section
+    and at speed zero: the rest of the way, room <= move_step, in one section
 
 so that the way ends at the target exactly, without a division or a square root, whatever the target did before.  Two
 moving means over M samples make the profile smooth; the trajectory has them as sums of its second difference, ``jerk``,
 which is constant in a section.  The way of a section is ``advance`` = M*profile.
 
-Without ``active`` the profile follows the speed of the shaft in the section before, up to move_speed.  ``use_stops``
+Without ``active`` the profile follows the speed of the shaft in the section before, up to move_speed, and ``speed`` is
+the multiple of move_step below it.  ``use_stops``
 keeps the target within stop_low..stop_high.  New move_step and jerk_bits wait for rest (``still``).
 
 Formats: way S(13,44) turns of the shaft, wraps; profile and move_step in units of M**2 * 2**-44 turns per sample, to
@@ -67,6 +68,7 @@ def profiled(state, d, active, move_speed, bits, gain):
     most = (move_speed << 4) >> (2 * bits)
     if not active:
         most, room = clamp(room, 0, most), FAR
+    rest = min(max(room, 0), most)
     speed, stop, profile = state.speed, state.stop, 0
     if turns and state.last != 0:  # a section at rest before the way back
         return speed, stop, down, profile
@@ -75,13 +77,11 @@ def profiled(state, d, active, move_speed, bits, gain):
         speed += gain
         profile = speed
     elif speed <= most and stop + speed <= room:
-        profile = speed
-        if speed == 0 and active:
-            profile = min(room, most)
+        profile = speed if speed > 0 and active else rest
     else:
         speed = max(speed - gain, 0)
         stop -= speed
-        profile = speed
+        profile = speed if speed > 0 else rest
     return speed, stop, down, -profile if down else profile
 
 

@@ -10,10 +10,10 @@ position_ref is the target.  Without ``position_mode`` or ``run`` the profile fo
 position_ref the position, so that position mode begins at the speed there is.
 
     omega_ff += k_filter*(k_speed*v - omega_ff)         the speed as the measurement sees it
-    torque_ff = k_inertia*a                             zero without position_mode or run
+    torque_ff = k_inertia*a + k_viscous*v + coulomb*sign(v)       zero without position_mode or run, v without torque_lead
 
 Formats: way S(13,44) turns of the shaft, wraps; v and a S(-3,44) per sample.  v is rounded to 36, a to 42 fraction bits;
-these, products and position_ref half up; a's factor, torque_ff and omega_ff saturate.
+these, products and position_ref half up; a's factor, both products, torque_ff and omega_ff saturate.
 """
 
 from collections import namedtuple
@@ -24,7 +24,7 @@ from golden_model.control import position_plan
 from golden_model.control.position_control import POSITION, POSITION_W
 from golden_model.control.position_plan import SMALL, WAY, WAY_W
 from golden_model.fixed import Format, round_half_up, round_sat, saturate, wrap_s
-from golden_model.formats import BIT, INTEGRAL, INTEGRAL_W, PU, PU_W
+from golden_model.formats import BIT, INTEGRAL, INTEGRAL_W, KP, PU, PU_W
 from golden_model.io.speed import K_FILTER, K_SPEED
 from golden_model.kernel import kernel
 
@@ -33,6 +33,7 @@ FACTOR_W = 34  # then, two halves of 17 bits
 K_INERTIA = Format(0, 20, 4)
 DROP_OMEGA = WAY.frac_bits - V_DROP + K_SPEED.frac_bits - INTEGRAL.frac_bits
 DROP_TORQUE = WAY.frac_bits - A_DROP + K_INERTIA.frac_bits - PU.frac_bits
+DROP_VISCOUS = WAY.frac_bits - V_DROP + KP.frac_bits - PU.frac_bits
 DROP_ERROR = 6
 DROP_FILTER = INTEGRAL.frac_bits - DROP_ERROR + K_FILTER.frac_bits - INTEGRAL.frac_bits
 
@@ -107,7 +108,10 @@ def step(state, inputs, regs):
     raw = round_sat(r.k_speed * round_half_up(v_used, V_DROP), DROP_OMEGA, INTEGRAL_W)
     error = round_half_up(raw - s.omega_ff, DROP_ERROR)
     omega_ff = saturate(s.omega_ff + round_half_up(r.k_filter * error, DROP_FILTER), INTEGRAL_W)
-    torque_ff = round_sat(r.k_inertia * saturate(round_half_up(a, A_DROP), FACTOR_W), DROP_TORQUE, PU_W)
+    by_inertia = round_sat(r.k_inertia * saturate(round_half_up(a, A_DROP), FACTOR_W), DROP_TORQUE, PU_W)
+    viscous = round_sat(r.k_viscous * round_half_up(v, V_DROP), DROP_VISCOUS, PU_W)
+    coulomb = r.coulomb if v > 0 else -r.coulomb if v < 0 else 0
+    torque_ff = saturate(by_inertia + viscous + coulomb, PU_W)
     following = State(
         phase=(s.phase + 1) & position_plan.last_sample(plan.bits), lead=lead, jerk=jerk, at_rest=at_rest, a=a, v=v,
         v_1=s.v, v_2=s.v_1, v_3=s.v_2, v_4=s.v_3, v_5=s.v_4, v_6=s.v_5, ahead=ahead - v_used, way=way,
@@ -127,11 +131,12 @@ def reference(v, state):
     used = (used + 8192.0) % 16384.0 - 8192.0
     raw, half = INTEGRAL.limit(v["k_speed"] * used), POSITION.lsb / 2
     omega = state.omega_ff * INTEGRAL.lsb
-    torque = PU.limit(v["k_inertia"] * Format(1, -9, 42).limit(after.a * WAY.lsb)) if active else 0.0
+    torque = PU.limit(v["k_inertia"] * Format(1, -9, 42).limit(after.a * WAY.lsb))
+    torque += PU.limit(v["k_viscous"] * after.v * WAY.lsb) + v["coulomb"] * ((after.v > 0) - (after.v < 0))
     return {
         "position_ref": (after.way * WAY.lsb + 8192.0 + half) % 16384.0 - 8192.0 - half,  # rounded up at the end: wraps
         "omega_ff": INTEGRAL.limit(omega + v["k_filter"] * (raw - omega)),
-        "torque_ff": torque,
+        "torque_ff": PU.limit(torque) if active else 0.0,
         "at_rest": after.at_rest,
     }
 
@@ -143,7 +148,7 @@ def bound(v, _state):
     return {
         "position_ref": POSITION.lsb / 2,
         "omega_ff": omega + INTEGRAL.lsb,
-        "torque_ff": v["k_inertia"] * a_lsb / 2 + PU.lsb,
+        "torque_ff": v["k_inertia"] * a_lsb / 2 + v["k_viscous"] * v_lsb / 2 + 2 * PU.lsb,
         "at_rest": 0.0,
     }
 
@@ -170,6 +175,7 @@ def stimuli(rng, _config):
         pace = {"jerk_bits": int(rng.integers(2)), "torque_lead": int(rng.integers(8))}
         pace |= {"move_speed": int(2 ** rng.uniform(8, 31)), "move_step": int(2 ** rng.uniform(8, 31))}
         pace |= {"k_speed": int(2 ** rng.uniform(8, 24)), "k_filter": int(rng.integers(1 << 16))}
+        pace |= {"k_viscous": int(2 ** rng.uniform(0, 24)), "coulomb": int(2 ** rng.uniform(0, 17))}
         pace |= {"k_inertia": int(2 ** rng.uniform(0, 24)), "use_stops": int(rng.integers(2))}
         low, high = sorted(int(x) for x in rng.integers(-(1 << 20), 1 << 20, 2))
         target = int(rng.integers(POSITION.lo, POSITION.hi)) >> int(rng.integers(20))
@@ -184,7 +190,9 @@ REGISTERS = (
     Port("torque_lead", Format(0, 3, 0), doc="samples by which torque_ff precedes the position"),
     Port("k_speed", K_SPEED, doc="speed per turn and sample"),
     Port("k_filter", K_FILTER, hi=1 << 16, doc="filter weight of the new sample, 1 = no filter"),
-    Port("k_inertia", K_INERTIA, doc="torque per turn and square of a sample"),
+    Port("k_inertia", K_INERTIA, doc="torque, or current, per turn and square of a sample"),
+    Port("k_viscous", KP, doc="torque, or current, of viscous friction per turn and sample"),
+    Port("coulomb", PU, lo=0, doc="torque, or current, of Coulomb friction"),
 )
 Registers = namedtuple("Registers", [p.name for p in REGISTERS])
 Inputs = namedtuple("Inputs", ["shaft_position", "run"])
@@ -215,6 +223,7 @@ BLOCK = Block(
         "FACTOR_W": FACTOR_W,
         "DROP_OMEGA": DROP_OMEGA,
         "DROP_TORQUE": DROP_TORQUE,
+        "DROP_VISCOUS": DROP_VISCOUS,
         "DROP_ERROR": DROP_ERROR,
         "DROP_FILTER": DROP_FILTER,
     },

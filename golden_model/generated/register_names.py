@@ -158,6 +158,8 @@ ADDRESSES = {
     "stop_low": 0x2A8,
     "stop_high": 0x2AC,
     "k_inertia": 0x2B0,
+    "k_viscous": 0x2B4,
+    "coulomb": 0x2B8,
     "shaft_position": 0x2E0,
     "position_error": 0x2E4,
     "ring_arm": 0x3C0,

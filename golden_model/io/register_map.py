@@ -113,8 +113,8 @@ _SETTINGS = """
     268 omega_learn   26c table_word     270 v_start        274 torque_step
     280 position_mode 284 position_target                 288 position_kp    28c position_band  290 omega_most
     294 move_speed    298 move_step      29c jerk_bits      2a0 torque_lead    2a4 use_stops      2a8 stop_low
-    2ac stop_high     2b0 k_inertia
-"""  # 23c, 244 to 24c, 278, 27c, 2b4 to 2dc, 2e8 to 3bc and 3f0 to 3fc are free
+    2ac stop_high     2b0 k_inertia      2b4 k_viscous      2b8 coulomb
+"""  # 23c, 244 to 24c, 278, 27c, 2bc to 2dc, 2e8 to 3bc and 3f0 to 3fc are free
 _COMMANDS = {
     "enable": (0x040, Kind.COMMAND),
     "clear_trip": (0x044, Kind.PULSE),

@@ -107,7 +107,12 @@ begin
         state.mark <= shaft_position;
         end_1      <= way + ahead;
         if use_stops = '1' then
-          target_1 <= maximum(stop_low, minimum(stop_high, position_target));
+          if position_target > stop_high then
+            target_1 <= stop_high;
+          end if;
+          if position_target < stop_low or stop_high < stop_low then
+            target_1 <= stop_low;
+          end if;
         end if;
         if still_0 = '1' then
           state.bits <= jerk_bits;
@@ -158,6 +163,9 @@ begin
       faster_11 <= '1' when faster_10 <= most and reach_10 <= room else '0';
       as_fast   <= '1' when signed('0' & state.speed) <= most and need_10 <= room else '0';
       rest_11   <= resize(room, PROFILE_W + 1) when room < most else most;
+      if room < 0 then
+        rest_11 <= (others => '0');
+      end if;
 
       -- Stage 12: the profile of the section, its speed and stop
       if valid(11) = '1' then
@@ -170,10 +178,11 @@ begin
           state.stop  <= state.stop + state.speed;
         elsif as_fast = '1' then
           size_12 <= signed('0' & state.speed);
-          if state.speed = 0 and active = '1' then
+          if state.speed = 0 or active = '0' then
             size_12 <= rest_11;
           end if;
-        elsif slower_11 < 0 then
+        elsif slower_11 <= 0 then
+          size_12     <= rest_11;
           state.speed <= (others => '0');
         else
           size_12     <= slower_11;

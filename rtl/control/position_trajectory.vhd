@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: trajectory to a target with limited speed, acceleration and jerk, and what the loops below are fed forward.
 --   position_plan gives the jerk of each section of samples;  a += jerk;  v += a;  position_ref += v, torque_lead later
---   omega_ff += k_filter*(k_speed*v - omega_ff);  torque_ff = k_inertia*a
+--   omega_ff += k_filter*(k_speed*v - omega_ff);  torque_ff = k_inertia*a + k_viscous*v + coulomb*sign(v)
 -- Without position_mode or run the profile follows the measured speed and position_ref the position; torque_ff is zero.
--- One multiplier is used five times a sample.
+-- One multiplier is used seven times a sample.
 -- Formats: way S(13,44) turns, v and a S(-3,44), factors 34 bits in two halves; omega_ff S(1,28), torque_ff PU.
 -- Latency: 36.  Interval: 37.
 -- Rounding: half up; a's factor, omega_ff and torque_ff saturate; the way wraps.
@@ -33,6 +33,8 @@ entity position_trajectory is
     k_speed         : in  unsigned(23 downto 0);
     k_filter        : in  unsigned(16 downto 0);
     k_inertia       : in  unsigned(23 downto 0);
+    k_viscous       : in  unsigned(KP_W - 1 downto 0);
+    coulomb         : in  signed(PU_W - 1 downto 0);
     out_valid       : out std_logic;
     position_ref    : out signed(31 downto 0);
     omega_ff        : out signed(INTEGRAL_W - 1 downto 0);
@@ -79,6 +81,10 @@ architecture rtl of position_trajectory is
   signal rounded     : signed(WAY_W + 1 - SMALL downto 0);
   signal factor_v    : signed(FACTOR_W - 1 downto 0);
   signal factor_a    : signed(FACTOR_W - 1 downto 0);
+  signal factor_now  : signed(FACTOR_W - 1 downto 0);  -- v without torque_lead
+  signal by_inertia  : signed(PU_W - 1 downto 0);
+  signal viscous     : signed(PU_W - 1 downto 0);
+  signal friction    : signed(PU_W - 1 downto 0);
   signal x           : signed(24 downto 0);
   signal y           : signed(17 downto 0);
   signal p           : signed(42 downto 0);
@@ -147,9 +153,15 @@ begin
         end if;
         factor_v <= resize(round_half_up(v_used, POSITION_TRAJECTORY_V_DROP), FACTOR_W);
         factor_a <= round_sat(state.a, POSITION_TRAJECTORY_A_DROP, FACTOR_W);
+
+        factor_now <= resize(round_half_up(state.v, POSITION_TRAJECTORY_V_DROP), FACTOR_W);
+        friction   <= negated(coulomb, state.v(V_W - 1));
+        if state.v = 0 then
+          friction <= (others => '0');
+        end if;
       end if;
 
-      -- Stages 26 to 29: k_speed*v and k_inertia*a, a half at a time
+      -- Stages 26 to 31: k_speed*v, k_inertia*a and k_viscous*v, a half at a time
       if valid(25) = '1' then
         x            <= signed('0' & k_speed);
         y            <= high(factor_v);
@@ -165,32 +177,45 @@ begin
       if valid(28) = '1' then
         y <= low(factor_a);
       end if;
+      if valid(29) = '1' then
+        x <= signed('0' & k_viscous);
+        y <= high(factor_now);
+      end if;
+      if valid(30) = '1' then
+        y <= low(factor_now);
+      end if;
 
-      -- Stages 28 to 31: sums of the halves
-      if valid(27) = '1' or valid(29) = '1' then
+      -- Stages 28 to 33: sums of the halves
+      if valid(27) = '1' or valid(29) = '1' or valid(31) = '1' then
         sum <= shift_left(resize(p, SUM_W), HALF_W);
       end if;
-      if valid(28) = '1' or valid(30) = '1' then
+      if valid(28) = '1' or valid(30) = '1' or valid(32) = '1' then
         sum <= sum + p;
       end if;
 
-      -- Stage 30: raw = k_speed*v;  stage 32: torque_ff
+      -- Stage 30: raw = k_speed*v;  stages 32, 34, 35: torque_ff
       if valid(29) = '1' then
         raw <= round_sat(sum, POSITION_TRAJECTORY_DROP_OMEGA, INTEGRAL_W);
       end if;
       if valid(31) = '1' then
-        torque_ff <= round_sat(sum, POSITION_TRAJECTORY_DROP_TORQUE, PU_W);
+        by_inertia <= round_sat(sum, POSITION_TRAJECTORY_DROP_TORQUE, PU_W);
+      end if;
+      if valid(33) = '1' then
+        viscous <= round_sat(sum, POSITION_TRAJECTORY_DROP_VISCOUS, PU_W);
+      end if;
+      if valid(34) = '1' then
+        torque_ff <= saturate(resize(by_inertia, PU_W + 2) + viscous + friction, PU_W);
         if active = '0' then
           torque_ff <= (others => '0');
         end if;
       end if;
 
-      -- Stages 31 to 33: omega_ff += k_filter*(raw - omega_ff)
-      if valid(30) = '1' then
+      -- Stages 32 to 34: omega_ff += k_filter*(raw - omega_ff)
+      if valid(31) = '1' then
         x <= resize(round_half_up(resize(raw, INTEGRAL_W + 1) - state.omega_ff, POSITION_TRAJECTORY_DROP_ERROR), 25);
         y <= signed('0' & k_filter);
       end if;
-      if valid(32) = '1' then
+      if valid(33) = '1' then
         state.omega_ff <= saturate(resize(state.omega_ff, 44) + round_half_up(p, POSITION_TRAJECTORY_DROP_FILTER),
                                    INTEGRAL_W);
       end if;

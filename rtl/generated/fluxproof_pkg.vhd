@@ -101,7 +101,9 @@ package fluxproof_pkg is
     stop_low         : signed(31 downto 0);  -- soft end stop, turns of the shaft
     stop_high        : signed(31 downto 0);  -- soft end stop, turns of the shaft
     torque_lead      : unsigned(2 downto 0);  -- samples by which torque_ff precedes the position
-    k_inertia        : unsigned(23 downto 0);  -- torque per turn and square of a sample
+    k_inertia        : unsigned(23 downto 0);  -- torque, or current, per turn and square of a sample
+    k_viscous        : unsigned(KP_W - 1 downto 0);  -- torque, or current, of viscous friction per turn and sample
+    coulomb          : signed(PU_W - 1 downto 0);  -- torque, or current, of Coulomb friction
     speed_kp         : unsigned(KP_W - 1 downto 0);  -- proportional gain
     speed_ki         : unsigned(KI_W - 1 downto 0);  -- integral gain times sample time
     k_flux           : unsigned(KP_W - 1 downto 0);  -- 1 over the flux linkage of the table's last row
@@ -422,6 +424,7 @@ package fluxproof_pkg is
   constant POSITION_TRAJECTORY_FACTOR_W : natural := 34;
   constant POSITION_TRAJECTORY_DROP_OMEGA : natural := 20;
   constant POSITION_TRAJECTORY_DROP_TORQUE : natural := 30;
+  constant POSITION_TRAJECTORY_DROP_VISCOUS : natural := 36;
   constant POSITION_TRAJECTORY_DROP_ERROR : natural := 6;
   constant POSITION_TRAJECTORY_DROP_FILTER : natural := 10;
 

@@ -687,6 +687,14 @@ begin
         settings.k_inertia <= unsigned(held(23 downto 0));
         written(172)       <= '1';
       end if;
+      if (row(21) and column(5) and not sample_busy) = '1' then
+        settings.k_viscous <= unsigned(held(23 downto 0));
+        written(173)       <= '1';
+      end if;
+      if (row(21) and column(6) and not sample_busy) = '1' then
+        settings.coulomb <= signed(held(17 downto 0));
+        written(174)     <= '1';
+      end if;
       if (row(30) and column(0)) = '1' then
         ring_arm <= held(0);
       end if;
@@ -837,6 +845,8 @@ begin
         settings.stop_low         <= (others => '0');
         settings.stop_high        <= (others => '0');
         settings.k_inertia        <= (others => '0');
+        settings.k_viscous        <= (others => '0');
+        settings.coulomb          <= (others => '0');
         ring_arm                  <= '0';
         ring_stop                 <= '0';
         ring_faults               <= (others => '0');
