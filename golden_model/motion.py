@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """[position] of drive.toml and the registers of the position loop, see docs/position.md.
 
-What is not given is ordinary: a bandwidth of a quarter of the speed loop's, the rated speed, the acceleration of 80 % of
-the rated torque (friction and the regulator need the rest), built up in 8 samples, a dead band of one count of the
+What is not given is ordinary: a bandwidth of a quarter of the speed loop's, the rated speed, the acceleration of 80 %
+of the rated torque (friction and the regulator need the rest), built up in 8 samples, a dead band of one count of the
 encoder, no stops.
 """
 

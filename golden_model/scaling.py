@@ -25,8 +25,8 @@ docs/board.md.
 
 import math
 
-from golden_model.protection_limits import protection
 from golden_model.motion import position_loop
+from golden_model.protection_limits import protection
 from golden_model.scale_entry import Entry, base_keys, leg_loss_v
 from golden_model.units import TURN_RAD
 

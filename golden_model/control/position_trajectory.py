@@ -10,10 +10,10 @@ position_ref is the target.  Without ``position_mode`` or ``run`` the profile fo
 position_ref the position, so that position mode begins at the speed there is.
 
     omega_ff += k_filter*(k_speed*v - omega_ff)         the speed as the measurement sees it
-    torque_ff = k_inertia*a + k_viscous*v + coulomb*sign(v)       zero without position_mode or run, v without torque_lead
+    torque_ff = k_inertia*a + k_viscous*v + coulomb*sign(v)       with v of now; zero without position_mode or run
 
-Formats: way S(13,44) turns of the shaft, wraps; v and a S(-3,44) per sample.  v is rounded to 36, a to 42 fraction bits;
-these, products and position_ref half up; a's factor, both products, torque_ff and omega_ff saturate.
+Formats: way S(13,44) turns of the shaft, wraps; v and a S(-3,44) per sample.  v is rounded to 36, a to 42 fraction
+bits; these, products and position_ref half up; a's factor, both products, torque_ff and omega_ff saturate.
 """
 
 from collections import namedtuple
@@ -154,7 +154,7 @@ def bound(v, _state):
 
 
 def stimuli(rng, _config):
-    """Moves of every length and both directions, targets that change on the way, stops, followed shafts, each setting."""
+    """Moves of every length and both directions, targets that change on the way, stops, followed shafts."""
     rows, position = [], 0
     calm = {"run": 1, "position_mode": 1, "k_speed": 200 << 12, "k_filter": 1 << 16, "k_inertia": 3000 << 4}
 

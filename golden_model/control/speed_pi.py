@@ -11,8 +11,8 @@ Torque mode (``speed_mode`` = 0): i_q_ref is ``i_q_ext``, limited, and the integ
 a change to speed mode is bumpless.  ``run`` = 0: output and integral are zero.  torque_ff, of a trajectory, acts in
 speed mode within the same limit; it is zero without one.
 
-Formats: err saturated to PU; proportional part rounded half up and with torque_ff S(10,28), which holds every sum; increment
-rounded half up to S(1,28), where 2**-16 * ki still counts; the integral is kept within +-i_q_max; sum exact, rounded
+Formats: err saturated to PU; proportional part rounded half up and with torque_ff S(10,28), which holds every sum;
+increment rounded half up to S(1,28), where 2**-16 * ki still counts; the integral is kept within +-i_q_max; sum exact, rounded
 half up to PU.
 """
 
