@@ -127,7 +127,7 @@ def position_loop(drive):
     share = on * fed_forward(drive)
     yield Entry("k_inertia", share * m.inertia_kgm2, f"{unit} s2/rad", one * t_s * t_s / TURN_RAD, keys)
     keys = "[machine] viscous_friction_nms, magnet_flux_wb, pole_pairs"
-    yield Entry("k_viscous", share * m.viscous_friction_nms, f"{unit} s/rad", one * t_s / TURN_RAD, keys)
+    yield Entry("k_viscous", share * m.viscous_friction_nms, f"{unit} s/rad of shaft", one * t_s / TURN_RAD, keys)
     keys = "[machine] coulomb_friction_nm, magnet_flux_wb, pole_pairs"
     yield Entry("coulomb", share * m.coulomb_friction_nm, unit, one, keys)
 
