@@ -73,7 +73,10 @@ def build(toplevel: str, rtl: Path = RTL, extra=()) -> Path:
 def _ghdl(what: str, folder: Path, toplevel: str, rest) -> None:
     """One of GHDL's commands on a library; BuildError with its words."""
     command = ["ghdl", what, "--std=08", "--work=top", f"--workdir={folder}", *map(str, rest)]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    except FileNotFoundError:
+        raise BuildError(f"{toplevel} does not build: ghdl is not installed (make setup)") from None
     (folder / f"{toplevel}.log").write_text(done.stdout + done.stderr)
     if done.returncode:
         words = (done.stdout + done.stderr).splitlines()
