@@ -6,6 +6,7 @@ It listens at the loopback address; at another one every view needs the token of
 
 from __future__ import annotations
 
+import asyncio
 import hmac
 import io
 import secrets
@@ -13,6 +14,7 @@ from html import escape
 from typing import NamedTuple
 
 import numpy as np
+from bokeh.document import without_document_lock
 from bokeh.layouts import column, row
 from bokeh.models import Button, ColumnDataSource, CustomJS, Div, Select, Toggle
 from bokeh.plotting import figure
@@ -22,14 +24,17 @@ from fluxproof.watch.explain import Explainer
 from fluxproof.watch.live import Live, Look
 from fluxproof.watch.sinks import scales_of, table
 from golden_model.drive import Drive
+from golden_model.estimators.flux_monitor import CONDITIONS
 from golden_model.units import si_per_lsb
 
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 PICTURE_MS = 100
 POINTS = 500  # pairs of smallest and largest value of a curve
+WIDE = 400  # px of the column beside the curves
 WINDOWS_S = ("0.05", "0.2", "1", "5", "20")
 SHOWN = ("i_d", "i_q", "i_q_ref", "omega_me", "omega_ref", "lambda_d", "lambda_q", "u_d", "u_q", "u_dc")
-FLAGS = ("run", "speed_mode", "current_at_rail", "temp_lost", "psi_held", "flux_faults", "sat_d", "sat_q")
+FLAGS = {"current_at_rail": "current converter at its end", "temp_lost": "no winding temperature",
+         "psi_held": "psi_m held", "sat_d": "u_d at its limit", "sat_q": "u_q at its limit"}  # fmt: skip
 COLOURS = {"i_d": "#0072b2", "i_q": "#d55e00", "i_q_ref": "#000000", "speed": "#0072b2", "speed_ref": "#000000",
            "torque": "#009e73"}  # fmt: skip
 
@@ -60,6 +65,15 @@ def curves(look: Look, drive: Drive) -> dict[str, np.ndarray]:
     poles, rpm = drive.machine.pole_pairs, 30.0 / np.pi / drive.machine.pole_pairs
     torque = 1.5 * poles * (si["lambda_d"] * si["i_q"] - si["lambda_q"] * si["i_d"])
     return si | {"speed": si["omega_me"] * rpm, "speed_ref": si["omega_ref"] * rpm, "torque": torque}
+
+
+def state_of(fields: dict[str, np.ndarray]) -> str:
+    """The flags of the last row in words."""
+    last = {name: int(column[-1]) for name, column in fields.items()}
+    said = ["gates on" if last["run"] else "gates off", "speed control" if last["speed_mode"] else "current control"]
+    said += [words for name, words in FLAGS.items() if last[name]]
+    found = [words for bit, words in enumerate(CONDITIONS) if last["flux_faults"] >> bit & 1]
+    return ", ".join(said) + (f"; the flux estimate was disturbed: {', '.join(found)}" if found else "")
 
 
 def serve(scene: Scene, address: str, port: int) -> tuple[Server, str]:
@@ -104,12 +118,15 @@ def _view(doc, scene: Scene) -> None:
 
     def plot(title: str, names: tuple[str, ...], unit: str):
         made = figure(
-            title=title, height=200, width=620, y_axis_label=unit, tools="xpan,xwheel_zoom,crosshair,hover,reset"
-        )
+            title=title, height=210, min_width=420, sizing_mode="stretch_width", y_axis_label=unit,
+            tools="xpan,xwheel_zoom,crosshair,hover,reset",
+        )  # fmt: skip
         for name in names:
             sources[name] = ColumnDataSource({"x": [], "y": []})
             made.line("x", "y", source=sources[name], color=COLOURS[name], legend_label=name, name=name)
-        made.legend.location = "top_left"
+        made.legend.orientation, made.legend.border_line_color = "horizontal", None
+        made.legend.padding = made.legend.margin = 0
+        made.add_layout(made.legend[0], "above")  # beside the curves, never over them
         return made
 
     plots = [
@@ -120,13 +137,14 @@ def _view(doc, scene: Scene) -> None:
     for other in plots[1:]:
         other.x_range = plots[0].x_range
     plots[-1].xaxis.axis_label = "s since the reset"
-    circle = figure(title="Voltage, its limit u_dc / sqrt 3", height=320, width=320, match_aspect=True, tools="reset")
+    circle = figure(title="Voltage, its limit u_dc / sqrt 3", height=320, width=320, match_aspect=True, tools="")
+    circle.toolbar_location = None
     sources["voltage"] = ColumnDataSource({"x": [], "y": []})
     sources["limit"] = ColumnDataSource({"x": [], "y": []})
     circle.line("x", "y", source=sources["limit"], color="#000000", name="limit")
     circle.scatter("x", "y", source=sources["voltage"], size=2, color="#d55e00", name="voltage")
-    said, digital, why, flags = Div(), Div(), Div(width=420), Div(width=420)
-    window = Select(title="Window [s]", value="1", options=list(WINDOWS_S), name="window")
+    said, digital, why, flags = (Div(width=WIDE - 10) for _ in range(4))
+    window = Select(title="Window [s]", value="1", options=list(WINDOWS_S), name="window", width=80)
     hold = Toggle(label="Hold", name="hold")
     trigger = Toggle(label="Hold when the gates go off", name="trigger")
     export = Button(label="Export what is shown (Parquet)", name="export")
@@ -148,15 +166,19 @@ def _view(doc, scene: Scene) -> None:
             hold.active = True
         held[:] = [look]
         _show(look, drive, sources)
-        flags.text = escape(", ".join(f"{name} {int(look.fields[name][-1])}" for name in FLAGS))
+        flags.text = escape(state_of(look.fields))
 
-    def save() -> None:
+    @without_document_lock
+    async def save() -> None:
+        """In a thread: the first export loads pyarrow, and the pictures go on meanwhile."""
         if held:
-            carried.data = {"file": [np.frombuffer(parquet_of(held[0], drive), np.uint8).tolist()]}
+            file = await asyncio.to_thread(parquet_of, held[0], drive)
+            data = {"file": [np.frombuffer(file, np.uint8).tolist()]}
+            doc.add_next_tick_callback(lambda: carried.update(data=data))
 
-    export.on_click(save)
-    controls = column(row(window, hold, trigger, export), said, digital, flags, why, circle)
-    doc.add_root(row(column(*plots), controls))
+    export.on_click(lambda: doc.add_next_tick_callback(save))
+    controls = column(row(window, hold, trigger), export, digital, said, flags, why, circle, width=WIDE)
+    doc.add_root(row(column(*plots, sizing_mode="stretch_width"), controls, sizing_mode="stretch_width"))
     doc.add_root(carried_root(carried))
     doc.add_periodic_callback(renew, PICTURE_MS)
 
