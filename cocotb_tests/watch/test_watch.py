@@ -5,9 +5,11 @@ from __future__ import annotations
 
 import contextlib
 import json
+import queue
 import shutil
 import socket
 import subprocess
+import sys
 import threading
 import time
 from urllib.request import urlopen
@@ -18,18 +20,23 @@ import pytest
 from bokeh.client import pull_session
 
 from cocotb_tests.support.drives import PAPER
-from fluxproof.checkout import ROOT
+from fluxproof.checkout import DRIVES, ROOT
 from fluxproof.command import main
+from fluxproof.commission.session import Step
+from fluxproof.commission.simulated import SimulatedBus, board_of
 from fluxproof.cosim.scenarios import everything
 from fluxproof.diagnosis.example import motor
 from fluxproof.diagnosis.replay.capture import capture, packets
 from fluxproof.diagnosis.replay.telemetry_stream import values
 from fluxproof.plant import IMPOSED_SPEED
+from fluxproof.watch.commissioning import Page, Story, Watched
+from fluxproof.watch.curves import thinned
 from fluxproof.watch.explain import Explainer, Explanation
 from fluxproof.watch.live import Live
 from fluxproof.watch.packets import Packets
-from fluxproof.watch.page import Scene, allowed, serve, state_of, thinned, token_for
+from fluxproof.watch.page import Scene, state_of, view
 from fluxproof.watch.replay import LiveReplay
+from fluxproof.watch.server import allowed, serve, token_for
 from fluxproof.watch.sinks import PlotJuggler
 from fluxproof.watch.source import Tcp, source_of
 from golden_model import drive as drives
@@ -200,9 +207,9 @@ def test_plotjuggler(words):
 
 
 @contextlib.contextmanager
-def served(scene: Scene):
-    """The address of a page, served by a thread."""
-    server, url = serve(scene, "127.0.0.1", 0)
+def served(shown):
+    """The address of a page with a token, served by a thread."""
+    server, url = serve(shown, "127.0.0.1", 0, "secret")
     thread = threading.Thread(target=server.io_loop.start)
     thread.start()
     try:
@@ -232,13 +239,14 @@ def test_page_in_a_browser(words, tmp_path):
     live = Live(source, 5000, LiveReplay(SET))
     live.pump()
     explainer = Explainer(live, DRIVE, str(PAPER), SET, 1.0)
+    scene = Scene(live, DRIVE, explainer)
 
     def more(rows) -> float:
         source.pieces.append(raw(rows))
         live.pump()
         return time.monotonic()
 
-    with served(Scene(live, DRIVE, explainer, "secret")) as url, browser.Browser(url, tmp_path) as page:
+    with served(lambda doc: view(doc, scene)) as url, browser.Browser(url, tmp_path) as page:
         page.until(f"document.title == 'Fluxproof' && {LAST} > 0")
         period = DRIVE.sample_time_s
         assert page.js(LAST) == pytest.approx(599 * period, abs=10 * period)
@@ -289,7 +297,7 @@ def focus_on(page: browser.Browser, label: str) -> None:
 def test_token(words):
     """Without the token a session has nothing of the drive."""
     live = watched(raw(words[:100]))
-    with served(Scene(live, DRIVE, None, "secret")) as url:
+    with served(lambda doc: view(doc, Scene(live, DRIVE, None))) as url:
         assert b"Fluxproof" in urlopen(url, timeout=10).read()
         bare = url.split("?")[0]
         for arguments, seen in (({"token": "secret"}, True), ({}, False), ({"token": "secre"}, False)):
@@ -297,7 +305,7 @@ def test_token(words):
             assert (session.document.select_one({"name": "i_q"}) is not None) == seen
             session.close()
     assert token_for("127.0.0.1") is None and len(token_for("0.0.0.0")) >= 20
-    assert not allowed(Scene(live, DRIVE, None, "a"), {}) and allowed(Scene(live, DRIVE, None, None), {})
+    assert not allowed("a", {}) and allowed(None, {})
 
 
 def test_flags_in_words(words):
@@ -331,3 +339,41 @@ def test_the_explanation_of_the_last_seconds_names_what_is_hidden(tmp_path):
     found = Explainer(live, drive, str(path), register_set, 1.0).explain()
     assert found.verdict == "explained" and found.counter == len(samples) - 1, found
     assert all(name in found.text for name in ("Dead time", "ncoder offset", "agnet flux")), found.text
+
+
+def test_what_the_page_of_a_commissioning_tells():
+    """Steps, what runs and the end in order; a page that does not keep up costs rows of the picture alone."""
+    story = Story()
+    for message in (("now", "offsets"), ("row", (0.1, (1, 2, 3, 4, 5, 6))), ("row", (0.2, (1, 2, 3, 4, 5, 7)))):
+        story.take(*message)
+    assert "offsets" in story.told() and story.picture()[1].tolist() == [[1, 2, 3, 4, 5, 6], [1, 2, 3, 4, 5, 7]]
+    story.take("step", Step("offsets", {}, "b 2007 < codes"))
+    story.take("end", "refused: the shaft is held")
+    told = story.told()
+    assert told.index("b 2007 &lt; codes") < told.index("refused: the shaft is held") and ">now<" not in told
+
+    page = Page.__new__(Page)  # without its process
+    page.messages, page.left_out = queue.Queue(2), 0
+    bus = Watched(SimulatedBus(DRIVE, board_of(DRIVE)), page)
+    rows = [bus.snapshot() for _ in range(3)]
+    assert page.left_out == 1 and page.messages.qsize() == 2
+    kind, (_, integers) = page.messages.get()
+    assert kind == "row" and integers[0] == rows[0]["i_d"] and integers[-1] == rows[0]["theta_me"]
+
+
+@pytest.mark.slow
+def test_a_commissioning_in_a_browser(tmp_path):
+    """The first step appears while the others run, and the end."""
+    if browser.CHROMIUM is None:
+        pytest.skip("chromium is not installed (Debian package chromium)")
+    command = [sys.executable, "-m", "fluxproof", "commission", str(DRIVES / "servo_24v.toml")]
+    command += ["--watch", "--port", "0"]
+    child = subprocess.Popen([*command, "--out", str(tmp_path / "out")], stdout=subprocess.PIPE, text=True)
+    try:
+        with browser.Browser(child.stdout.readline().split()[-1], tmp_path) as page:
+            page.until(f"{READ}.includes('codes') && {READ}.includes('now')", 300.0)
+            assert "accepted" not in page.js(READ)
+            page.until(f"{READ}.includes('accepted')", 300.0)
+    finally:
+        child.kill()
+        child.wait()

@@ -1,25 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The page of ``fluxproof watch``: a Bokeh server that looks at the rows ten times a second.
-
-It listens at the loopback address; at another one every view needs the token of the address that is printed.
-"""
+"""The page of ``fluxproof watch``, which looks at the rows ten times a second."""
 
 from __future__ import annotations
 
 import asyncio
-import hmac
 import io
-import secrets
 from html import escape
 from typing import NamedTuple
 
 import numpy as np
-from bokeh.document import without_document_lock
+from bokeh.document import Document, without_document_lock
 from bokeh.layouts import column, row
 from bokeh.models import Button, ColumnDataSource, CustomJS, Div, Select, Toggle
 from bokeh.plotting import figure
-from bokeh.server.server import Server
 
+from fluxproof.watch.curves import COLOURS, PICTURE_MS, POINTS, WIDE, plot, thinned
 from fluxproof.watch.explain import Explainer
 from fluxproof.watch.live import Live, Look
 from fluxproof.watch.sinks import scales_of, table
@@ -27,16 +22,10 @@ from golden_model.drive import Drive
 from golden_model.estimators.flux_monitor import CONDITIONS
 from golden_model.units import si_per_lsb
 
-LOOPBACK = ("127.0.0.1", "::1", "localhost")
-PICTURE_MS = 100
-POINTS = 500  # pairs of smallest and largest value of a curve
-WIDE = 400  # px of the column beside the curves
 WINDOWS_S = ("0.05", "0.2", "1", "5", "20")
 SHOWN = ("i_d", "i_q", "i_q_ref", "omega_me", "omega_ref", "lambda_d", "lambda_q", "u_d", "u_q", "u_dc")
 FLAGS = {"current_at_rail": "current converter at its end", "temp_lost": "no winding temperature",
          "psi_held": "psi_m held", "sat_d": "u_d at its limit", "sat_q": "u_q at its limit"}  # fmt: skip
-COLOURS = {"i_d": "#0072b2", "i_q": "#d55e00", "i_q_ref": "#000000", "speed": "#0072b2", "speed_ref": "#000000",
-           "torque": "#009e73"}  # fmt: skip
 
 
 class Scene(NamedTuple):
@@ -45,18 +34,6 @@ class Scene(NamedTuple):
     live: Live
     drive: Drive
     explainer: Explainer | None
-    token: str | None
-
-
-def thinned(time_s: np.ndarray, curve: np.ndarray, points: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest and largest value of each of ``points`` stretches: no peak is lost."""
-    size = -(-len(curve) // points)
-    if size < 2:
-        return time_s, curve
-    count = len(curve) // size
-    cut = curve[len(curve) - count * size :].reshape(count, size)
-    at = time_s[len(curve) - count * size :: size]
-    return np.repeat(at, 2), np.column_stack([cut.min(axis=1), cut.max(axis=1)]).ravel()
 
 
 def curves(look: Look, drive: Drive) -> dict[str, np.ndarray]:
@@ -76,28 +53,6 @@ def state_of(fields: dict[str, np.ndarray]) -> str:
     return ", ".join(said) + (f"; the flux estimate was disturbed: {', '.join(found)}" if found else "")
 
 
-def serve(scene: Scene, address: str, port: int) -> tuple[Server, str]:
-    """(the server, started; the address of its page); with the token that ``scene`` has."""
-    origins = None
-    if address not in LOOPBACK:
-        origins = [f"{address}:{port}"]
-    server = Server({"/": lambda doc: _view(doc, scene)}, port=port, address=address, allow_websocket_origin=origins)
-    server.start()
-    host = f"[{address}]" if ":" in address else address
-    return server, f"http://{host}:{server.port}/" + (f"?token={scene.token}" if scene.token else "")
-
-
-def token_for(address: str) -> str | None:
-    """None for the loopback address; else a new token."""
-    return None if address in LOOPBACK else secrets.token_urlsafe(18)
-
-
-def allowed(scene: Scene, arguments: dict[str, list[bytes]]) -> bool:
-    """Whether a request has the token."""
-    given = (arguments.get("token") or [b""])[0]
-    return scene.token is None or hmac.compare_digest(given, scene.token.encode())
-
-
 def parquet_of(look: Look, drive: Drive) -> bytes:
     """The rows as a Parquet file."""
     import pyarrow.parquet as pq  # half a second
@@ -107,32 +62,15 @@ def parquet_of(look: Look, drive: Drive) -> bytes:
     return out.getvalue()
 
 
-def _view(doc, scene: Scene) -> None:
+def view(doc: Document, scene: Scene) -> None:
     """One browser's view."""
-    doc.title = "Fluxproof"
-    if not allowed(scene, doc.session_context.request.arguments):
-        doc.add_root(Div(text="The address needs the token that `fluxproof watch` printed."))
-        return
     live, drive = scene.live, scene.drive
     sources: dict[str, ColumnDataSource] = {}
 
-    def plot(title: str, names: tuple[str, ...], unit: str):
-        made = figure(
-            title=title, height=210, min_width=420, sizing_mode="stretch_width", y_axis_label=unit,
-            tools="xpan,xwheel_zoom,crosshair,hover,reset",
-        )  # fmt: skip
-        for name in names:
-            sources[name] = ColumnDataSource({"x": [], "y": []})
-            made.line("x", "y", source=sources[name], color=COLOURS[name], legend_label=name, name=name)
-        made.legend.orientation, made.legend.border_line_color = "horizontal", None
-        made.legend.padding = made.legend.margin = 0
-        made.add_layout(made.legend[0], "above")  # beside the curves, never over them
-        return made
-
     plots = [
-        plot("Currents", ("i_d", "i_q", "i_q_ref"), "A"),
-        plot("Speed", ("speed", "speed_ref"), "rpm"),
-        plot("Torque from the flux", ("torque",), "Nm"),
+        plot("Currents", ("i_d", "i_q", "i_q_ref"), "A", sources),
+        plot("Speed", ("speed", "speed_ref"), "rpm", sources),
+        plot("Torque from the flux", ("torque",), "Nm", sources),
     ]
     for other in plots[1:]:
         other.x_range = plots[0].x_range
