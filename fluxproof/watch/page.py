@@ -137,7 +137,7 @@ def carried_root(carried: ColumnDataSource) -> Div:
 
 def _show(look: Look, drive: Drive, sources: dict[str, ColumnDataSource]) -> None:
     si, time_s = curves(look, drive), look.counter * drive.sample_time_s
-    for name in COLOURS:
+    for name in sources.keys() & COLOURS.keys():
         x, y = thinned(time_s, si[name])
         sources[name].data = {"x": x, "y": y}
     some = slice(-POINTS, None)
