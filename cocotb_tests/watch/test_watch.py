@@ -45,6 +45,7 @@ from golden_model.estimators.flux_monitor import CONDITIONS, FAULTS
 from golden_model.io.telemetry_words import COUNT, LAYOUT
 from golden_model.registers import registers
 from studies.live import browser
+from studies.live.browser import TEXT
 
 DRIVE = drives.load(PAPER)
 SET = registers(DRIVE)
@@ -221,11 +222,6 @@ def served(shown):
 
 
 LAST = "window.Bokeh?.documents?.[0]?.get_model_by_name('i_q')?.data_source.data.x.at(-1)"
-READ = """(() => { const walk = (root, out) => { for (const e of root.querySelectorAll('*')) {
-  if (e.shadowRoot) walk(e.shadowRoot, out); else if (e.children.length == 0) out.push(e.textContent); } return out; };
-  return walk(document.body, []).join("\\n"); })()"""  # also what stands inside of Bokeh's components
-
-
 FOCUSED = """(() => { let e = document.activeElement;
   while (e.shadowRoot?.activeElement) e = e.shadowRoot.activeElement; return e; })()"""
 
@@ -252,19 +248,19 @@ def test_page_in_a_browser(words, tmp_path):
         assert page.js(LAST) == pytest.approx(599 * period, abs=10 * period)
         more(words[600:1200])
         page.until(f"{LAST} > {1180 * period}")
-        assert "digital: equal over 1,200 samples" in page.js(READ) and "gates on" in page.js(READ)
+        assert "digital: equal over 1,200 samples" in page.js(TEXT) and "gates on" in page.js(TEXT)
 
         off = int(np.flatnonzero(np.diff(live_run := values(words, LAYOUT["run"])) < 0)[0]) + 1
         assert off > 1200 and live_run[off] == 0
         told = more(words[1200 : off + 50])
-        page.until(f"{READ}.includes('sample {off}: gates off')")
+        page.until(f"{TEXT}.includes('sample {off}: gates off')")
         assert time.monotonic() - told < 5.0  # a busy machine; `make live` measures it
         wrong = words[off + 50 : off + 60].copy()
         wrong[2, 11] ^= 4
         more(wrong)
-        page.until(f"{READ}.includes('sample {off + 52}, signal i_d, bit 2')")
+        page.until(f"{TEXT}.includes('sample {off + 52}, signal i_d, bit 2')")
         explainer.found.append(Explanation(off, "explained", "Dead time: 3.1 <V>"))
-        page.until(f"{READ}.includes('explained: Dead time: 3.1 <V>')")
+        page.until(f"{TEXT}.includes('explained: Dead time: 3.1 <V>')")
 
         named = {name for _, name in page.names("button", "combobox")}
         assert named >= {"Window [s]", "Hold", "Hold when the gates go off", "Export what is shown (Parquet)"}
@@ -274,7 +270,7 @@ def test_page_in_a_browser(words, tmp_path):
         page.until("Bokeh.documents[0].get_model_by_name('hold').active")
         shown = page.js(LAST)
         more(words[off + 60 : off + 200])
-        page.until(f"{READ}.includes('{off + 200:,} rows')")
+        page.until(f"{TEXT}.includes('{off + 200:,} rows')")
         assert page.js(LAST) == shown
         focus_on(page, "Export what is shown (Parquet)")
         page.key("Enter")
@@ -371,9 +367,9 @@ def test_a_commissioning_in_a_browser(tmp_path):
     child = subprocess.Popen([*command, "--out", str(tmp_path / "out")], stdout=subprocess.PIPE, text=True)
     try:
         with browser.Browser(child.stdout.readline().split()[-1], tmp_path) as page:
-            page.until(f"{READ}.includes('codes') && {READ}.includes('now')", 300.0)
-            assert "accepted" not in page.js(READ)
-            page.until(f"{READ}.includes('accepted')", 300.0)
+            page.until(f"{TEXT}.includes('codes') && {TEXT}.includes('now')", 300.0)
+            assert "accepted" not in page.js(TEXT)
+            page.until(f"{TEXT}.includes('accepted')", 300.0)
     finally:
         child.kill()
         child.wait()

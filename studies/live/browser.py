@@ -20,6 +20,9 @@ from tornado.websocket import websocket_connect
 
 BROWSERS = "chromium", "chromium-headless-shell", "chromium-browser", "google-chrome"
 CHROMIUM = next(filter(None, map(shutil.which, BROWSERS)), None)
+TEXT = """(() => { const walk = (root, out) => { for (const e of root.querySelectorAll('*')) {
+  if (e.shadowRoot) walk(e.shadowRoot, out); else if (e.children.length == 0) out.push(e.textContent); } return out; };
+  return document.body ? walk(document.body, []).join(" ") : ""; })()"""  # all that is written on the page
 START_S, STEP_S = 60.0, 0.02
 KEYS = {"Tab": 9, "Enter": 13, " ": 32, "ArrowUp": 38, "ArrowDown": 40}  # name: code of Windows, as the protocol asks
 

@@ -23,14 +23,11 @@ from fluxproof.plant import IMPOSED_SPEED
 from golden_model import drive as drives
 from golden_model.io.telemetry_words import COUNTER, LAYOUT
 from golden_model.registers import registers
-from studies.live.browser import Browser
+from studies.live.browser import TEXT, Browser
 
 EVERY_S, PATIENCE_S = 5.0, 300.0
 OFF_AT, WRONG_AT, WRONG_BIT = 500, 900, 3  # rows of the second part
 HIDDEN = ("Dead time", "ncoder offset", "agnet flux")
-TEXT = """(() => { const walk = (root, out) => { for (const e of root.querySelectorAll('*')) {
-  if (e.shadowRoot) walk(e.shadowRoot, out); else if (e.children.length == 0) out.push(e.textContent); } return out; };
-  return document.body ? walk(document.body, []).join(" ") : ""; })()"""  # inside of components too
 
 
 def parts() -> tuple[np.ndarray, np.ndarray]:
