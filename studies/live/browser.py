@@ -9,8 +9,11 @@ from __future__ import annotations
 
 import asyncio
 import base64
+import contextlib
 import json
+import os
 import shutil
+import signal
 import subprocess
 import time
 from pathlib import Path
@@ -37,7 +40,10 @@ class Browser:
         command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
         command += [f"--window-size={width},{height}", f"--user-data-dir={profile}", "--remote-debugging-port=0"]
         self.process = subprocess.Popen(
-            [*command, "about:blank"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, text=True
+            [*command, "about:blank"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,  # one group with its renderers, which outlive it otherwise
         )
         self.loop, self.socket, self.count = asyncio.new_event_loop(), None, 0
         try:
@@ -59,7 +65,8 @@ class Browser:
         """End the browser."""
         if self.socket is not None:
             self.socket.close()
-        self.process.kill()
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.process.pid, signal.SIGKILL)
         self.process.wait()
         self.loop.close()
 
