@@ -7,6 +7,7 @@ from golden_model.drive_keys import DriveError
 from golden_model.fluxproof import SAMPLE_INTERVAL
 from golden_model.formats import PU, VECTOR
 from golden_model.front_ends import check_converters, check_encoder
+from golden_model.protection_limits import default_u_dc_max_v, regen_end_v
 
 CARRIER_HALF_RANGE = (8, 32767)  # generic CARRIER_HALF of rtl/fluxproof.vhd
 ON_OF_DEAD, ON_S = 0.05, 20e-9  # shortest time that a switch is on: of the dead time, and at least
@@ -219,7 +220,26 @@ def _protection(drive):
         _refuse("[protection] watchdog_periods", p.watchdog_periods, "above 1; trip_watchdog = false ignores it")
 
 
+def _regeneration(drive):
+    """As the bus rises: the chopper first, then the line that limits the braking current, the trip last."""
+    p, bus = drive.protection, drive.inverter.dc_bus_v
+    if p.regen_start_v is None:
+        if p.regen_end_v is not None:
+            raise DriveError(
+                "[protection] regen_end_v needs regen_start_v, where the limit of the braking current begins"
+            )
+        return
+    key, least = ("brake_on_v", p.brake_on_v) if p.brake_on_v is not None else ("[inverter] dc_bus_v", bus)
+    most = p.u_dc_max_v or default_u_dc_max_v(drive)
+    if not least < p.regen_start_v < most:
+        allowed = f"above {key} = {least:g} V and below u_dc_max_v = {most:g} V, which trips"
+        _refuse("[protection] regen_start_v", p.regen_start_v, allowed)
+    if not p.regen_start_v < regen_end_v(drive) < most:
+        allowed = f"above regen_start_v = {p.regen_start_v:g} V and below u_dc_max_v = {most:g} V, which trips"
+        _refuse("[protection] regen_end_v", p.regen_end_v, allowed)
+
+
 RULES = (
     _sample_time, _sampling, _carrier, _pulses, _samples_per_turn, _voltage, _current, _flux, _codes, _speed_loop,
-    _current_loop, _flux_loop, _adaline_steps, _protection, check_encoder, check_converters,
+    _current_loop, _flux_loop, _adaline_steps, _protection, _regeneration, check_encoder, check_converters,
 )  # fmt: skip

@@ -112,6 +112,18 @@ def test_without_estimators(tmp_path):
     assert not any(arrays[f"observed_{name}"].any() for name in Estimated._fields)
 
 
+def test_braking_that_the_bus_limits(tmp_path):
+    """The line of [protection] regen_start_v in RTL: met, down to no braking current, and left again."""
+    skip_without_ghdl5()
+    path = tmp_path / "regen.toml"
+    path.write_text(f"{PAPER.read_text()}\n[protection]\nregen_start_v = 580\nregen_end_v = 640\n")
+    summary, arrays, _ = close_loop(InVerilator, path, "braking", 100, key=" regen")
+    limited = arrays["observed_regen_limited"] == 1
+    assert summary["differences"] == 0 and summary["periods_compared"] == 300
+    assert limited.sum() > 60 and (arrays["observed_i_q_ref"] == 0)[limited].any()
+    assert len(np.unique(arrays["observed_i_q_ref"][limited])) > 5, "a line, not a switch"
+
+
 def test_timeline():
     """Every block starts when its last input is valid and has its declared latency, measured in the RTL."""
     measured = timeline.measure()

@@ -43,6 +43,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "references",
         "table_current",
         "speed_regulator",
+        "regeneration",
         "current_regulators",
         "chord",
         "cross_coupling",
