@@ -1232,6 +1232,12 @@ extern "C" {
 #define FLUXPROOF__INDEX_ONCE__VALUE_bw 1
 #define FLUXPROOF__INDEX_ONCE__VALUE_reset 0x0
 
+// reg - fluxproof::whole_lines
+#define FLUXPROOF__WHOLE_LINES__VALUE_bm 0x1
+#define FLUXPROOF__WHOLE_LINES__VALUE_bp 0
+#define FLUXPROOF__WHOLE_LINES__VALUE_bw 1
+#define FLUXPROOF__WHOLE_LINES__VALUE_reset 0x0
+
 // reg - fluxproof::clock_ratio
 #define FLUXPROOF__CLOCK_RATIO__VALUE_bm 0x1f
 #define FLUXPROOF__CLOCK_RATIO__VALUE_bp 0
@@ -1637,7 +1643,7 @@ typedef struct {
     uint32_t position_delay;
     uint32_t bridge_max;
     uint32_t index_once;
-    uint8_t RESERVED_55c_55f[0x4];
+    uint32_t whole_lines;
     uint32_t clock_ratio;
     uint32_t spi_bits;
     uint32_t spi_skip;

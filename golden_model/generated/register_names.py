@@ -210,6 +210,7 @@ ADDRESSES = {
     "position_delay": 0x550,
     "bridge_max": 0x554,
     "index_once": 0x558,
+    "whole_lines": 0x55C,
     "clock_ratio": 0x560,
     "spi_bits": 0x564,
     "spi_skip": 0x568,

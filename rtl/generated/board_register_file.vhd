@@ -104,6 +104,7 @@ entity board_register_file is
     position_delay    : out unsigned(17 downto 0);  -- 550 time from the encoder's latch to the currents', samples
     bridge_max        : out unsigned(7 downto 0);  -- 554 samples that may be bridged one after the other
     index_once        : out std_logic;  -- 558 1: the first index is believed, 0: the second at the same place
+    whole_lines       : out std_logic;  -- 55c 1: over whole lines of four counts, which uneven counts do not disturb
     clock_ratio       : out unsigned(4 downto 0);  -- 560 clocks of a period of sclk, 4 to 16
     spi_bits          : out unsigned(5 downto 0);  -- 564 bits of a word, 12 to 32
     spi_skip          : out unsigned(4 downto 0);  -- 568 bits of a word before the code
@@ -871,6 +872,10 @@ begin
         index_once   <= held(0);
         written(342) <= '1';
       end if;
+      if (row(42) and column(7) and not sample_busy) = '1' then
+        whole_lines  <= held(0);
+        written(343) <= '1';
+      end if;
       if (row(43) and column(0) and not sample_busy) = '1' then
         clock_ratio  <= unsigned(held(4 downto 0));
         written(344) <= '1';
@@ -1141,6 +1146,7 @@ begin
         position_delay            <= (others => '0');
         bridge_max                <= (others => '0');
         index_once                <= '0';
+        whole_lines               <= '0';
         clock_ratio               <= (others => '0');
         spi_bits                  <= (others => '0');
         spi_skip                  <= (others => '0');

@@ -1018,6 +1018,10 @@ package fluxproof_pkg is
   -- index_check: none: incremental encoder
   constant INDEX_CHECK_LATENCY : positive := 1;
 
+  -- line_timer: none: speed by the time over whole lines
+  constant LINE_TIMER_LATENCY : positive := 1;
+  constant LINE_TIMER_SPAN_MORE : natural := 2;
+
   -- position_bridge: none: absolute encoders
   constant POSITION_BRIDGE_LATENCY : positive := 1;
   constant POSITION_BRIDGE_DROP : natural := 16;
