@@ -92,6 +92,26 @@ def _pulses(drive):
         _refuse(f"[inverter] {key}", pulse, f"up to half a PWM period, {half:g} s")
 
 
+def _low_side(drive):
+    """A shunt in a lower leg shows the current only while its switch is on, and the sample is in the middle of that.
+
+    The largest duty is 1 - reserve/2, so that half of the shortest low time, reserve*T/4, lies before the sample: dead
+    time and settling must fit it.  At the peak no lower switch is on.
+    """
+    settle, period = drive.sensors.low_side_settle_s, 1.0 / drive.inverter.pwm_frequency_hz
+    if settle is None:
+        return
+    if drive.core.updates_per_period == 2:
+        _refuse("[core] updates_per_period", 2, "1 with [sensors] low_side_settle_s: no lower switch is on at the peak")
+    needed_s = settle + drive.inverter.dead_time_s + max(-drive.sampling.delay_s, 0.0)
+    least = 4.0 * needed_s / period
+    least = max(least, 4.0 * drive.sampling.delay_s / period)  # and the switch is on until then
+    if not drive.control.voltage_reserve >= least * (1.0 - WHOLE):
+        why = f"half of the low time, voltage_reserve / 4 of {period:g} s, lies before the sample"
+        keys = f"[sensors] low_side_settle_s = {settle:g} and dead_time_s = {drive.inverter.dead_time_s:g}"
+        _refuse("[control] voltage_reserve", drive.control.voltage_reserve, f"at least {least:.4g} for {keys}: {why}")
+
+
 def _samples_per_turn(drive):
     """Flux models and chord integrate over a sample: its angle at the base of the speed is below half a radian."""
     rate, w = 1.0 / drive.sample_time_s, drive.bases.omega_me_rad_s
@@ -240,6 +260,6 @@ def _regeneration(drive):
 
 
 RULES = (
-    _sample_time, _sampling, _carrier, _pulses, _samples_per_turn, _voltage, _current, _flux, _codes, _speed_loop,
-    _current_loop, _flux_loop, _adaline_steps, _protection, _regeneration, check_encoder, check_converters,
+    _sample_time, _sampling, _carrier, _pulses, _low_side, _samples_per_turn, _voltage, _current, _flux, _codes,
+    _speed_loop, _current_loop, _flux_loop, _adaline_steps, _protection, _regeneration, check_encoder, check_converters,
 )  # fmt: skip

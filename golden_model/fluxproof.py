@@ -61,7 +61,7 @@ from golden_model.io import (
     u_dc_processing,
 )
 from golden_model.kernel import kernel
-from golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
+from golden_model.modulation import bootstrap_charge, gate_generation, pwm_compare, svm, svm_delay_compensation
 from golden_model.transforms import clarke, flux_inverse_park, flux_park, inverse_park, park, sincos
 
 # Instance of the top -> (its block, the instances it waits for).  A block starts when the last of them is done.
@@ -137,7 +137,13 @@ EARLY = {
     ("stator_voltage", "circle"): 1,
 }
 
-AT_THE_CLOCK = (sample_guard, host_watch, fault_latch, gate_generation)  # wired in golden_model/clocked.py
+AT_THE_CLOCK = (
+    sample_guard,
+    host_watch,
+    fault_latch,
+    bootstrap_charge,
+    gate_generation,
+)  # wired in golden_model/clocked.py
 MODULES = (*dict.fromkeys(module for module, _ in WIRING.values()), *AT_THE_CLOCK)
 
 

@@ -60,7 +60,7 @@ _ONE_OF_REGISTER = {
     "k_delay": "2*pi/omega_base",
     "omega_0": "1/T_s",
     **dict.fromkeys(("dead_time", "min_pulse", "watchdog"), "1/clock_hz"),
-    **dict.fromkeys(("runaway_samples", "stall_samples", "emf_samples", "heartbeat"), "T_s"),
+    **dict.fromkeys(("runaway_samples", "stall_samples", "emf_samples", "heartbeat", "charge_samples"), "T_s"),
 }
 
 

@@ -103,6 +103,8 @@ architecture rtl of fluxproof is
 
   -- Protection
   signal guard_busy, gate_trip, gate_clear, period : std_logic;
+  signal gates_on, charging, charged               : std_logic;
+  signal compare_a, compare_b, compare_c           : unsigned(15 downto 0);
 
   signal o : observed_t;
   signal e : estimated_t;
@@ -468,13 +470,24 @@ begin
               fault_flags => fault_flags, first_fault => first_fault, gate_trip => gate_trip, gate_clear => gate_clear,
               brake => brake);
 
+  charge : entity work.bootstrap_charge
+    port map (clk => clk, rst => rst,
+              gates_on => gates_on, period => period,
+              charge_samples => settings.charge_samples,
+              charging => charging, charged => charged);
+
+  compare_a <= o.compare_a and not charging;
+  compare_b <= o.compare_b and not charging;
+  compare_c <= o.compare_c and not charging;
+  running   <= gates_on and charged;
+
   gates : entity work.gate_generation
     generic map (CARRIER_HALF => CARRIER_HALF)
     port map (clk => clk, rst => rst,
-              compare_a => o.compare_a, compare_b => o.compare_b, compare_c => o.compare_c, enable => enable,
+              compare_a => compare_a, compare_b => compare_b, compare_c => compare_c, enable => enable,
               trip => gate_trip, clear_trip => gate_clear,
               dead_time => settings.dead_time, min_pulse => settings.min_pulse, double_update => settings.double_update,
-              gate_high => gate_high, gate_low => gate_low, sample => period, running => running,
+              gate_high => gate_high, gate_low => gate_low, sample => period, running => gates_on,
               tripped => tripped, setting_refused => setting_refused, min_pulse_used => min_pulse_used,
               double_used => double_used, carrier => carrier);
 

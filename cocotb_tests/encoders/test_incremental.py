@@ -258,7 +258,7 @@ def uneven_speeds(rpm: float, phase: float, duty: float, clocks: int) -> tuple[n
 @pytest.mark.parametrize("rpm", [1700.0, -3000.0])
 @pytest.mark.parametrize("phase, duty", [(25 / 90, 0.4), (-25 / 90, 0.4)])
 def test_uneven_counts_do_not_tremble_over_whole_lines(rpm, phase, duty):
-    """A and B 90 +- 25 degrees apart, levels of 60 % of a line: single counts tremble, the speed over lines does not."""
+    """A and B 90 +- 25 degrees apart, levels of 60 % of a line: single counts tremble, whole lines do not."""
     single, whole = uneven_speeds(rpm, phase, duty, 150_000)
     assert np.abs(whole / rpm - 1.0).max() < 2e-4 and (single / rpm).max() > 1.2
 

@@ -806,6 +806,12 @@ extern "C" {
 #define FLUXPROOF__REGEN_SLOPE__VALUE_bw 16
 #define FLUXPROOF__REGEN_SLOPE__VALUE_reset 0x0
 
+// reg - fluxproof::charge_samples
+#define FLUXPROOF__CHARGE_SAMPLES__VALUE_bm 0x3ff
+#define FLUXPROOF__CHARGE_SAMPLES__VALUE_bp 0
+#define FLUXPROOF__CHARGE_SAMPLES__VALUE_bw 10
+#define FLUXPROOF__CHARGE_SAMPLES__VALUE_reset 0x0
+
 // reg - fluxproof::use_table
 #define FLUXPROOF__USE_TABLE__VALUE_bm 0x1
 #define FLUXPROOF__USE_TABLE__VALUE_bp 0
@@ -1562,7 +1568,8 @@ typedef struct {
     uint32_t regen_start;
     uint32_t double_update;
     uint32_t regen_slope;
-    uint8_t RESERVED_248_24f[0x8];
+    uint32_t charge_samples;
+    uint8_t RESERVED_24c_24f[0x4];
     uint32_t use_table;
     uint32_t k_flux;
     uint32_t u_share;

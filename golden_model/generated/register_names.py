@@ -136,6 +136,7 @@ ADDRESSES = {
     "regen_start": 0x23C,
     "double_update": 0x240,
     "regen_slope": 0x244,
+    "charge_samples": 0x248,
     "use_table": 0x250,
     "k_flux": 0x254,
     "u_share": 0x258,

@@ -111,8 +111,8 @@ _SETTINGS = """
     240 double_update
     250 use_table     254 k_flux         258 u_share      25c k_voltage      260 share_min    264 k_torque
     268 omega_learn   26c table_word     270 v_start        274 torque_step
-    23c regen_start   244 regen_slope
-"""  # 248, 24c and 278 to 3bc and 3f0 to 3fc are free
+    23c regen_start   244 regen_slope     248 charge_samples
+"""  # 24c and 278 to 3bc and 3f0 to 3fc are free
 _COMMANDS = {
     "enable": (0x040, Kind.COMMAND),
     "clear_trip": (0x044, Kind.PULSE),

@@ -161,6 +161,7 @@ package fluxproof_pkg is
     brake_off        : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage below which it is off
     watchdog         : unsigned(19 downto 0);  -- longest time without a sample, clocks
     heartbeat        : unsigned(15 downto 0);  -- longest time without a write, sample times; 0: no limit
+    charge_samples   : unsigned(9 downto 0);  -- sample times with all lower switches on before the drive switches; 0: none
     dead_time        : unsigned(11 downto 0);  -- both gates of a leg off, clocks
   end record settings_t;
 
@@ -1249,6 +1250,10 @@ package fluxproof_pkg is
   constant U_DC_PROCESSING_SQRT3_2 : signed(17 downto 0) := to_signed(113512, 18);  -- 0.866025404 as U(0,17), signed for the multiplier
   constant U_DC_PROCESSING_DROP_BETA : natural := 17;
   constant U_DC_PROCESSING_INVERSE_W : natural := 22;
+
+  -- bootstrap_charge: none: supply of the upper gate drivers
+  constant BOOTSTRAP_CHARGE_LATENCY : positive := 1;
+  constant BOOTSTRAP_CHARGE_CHARGE_W : natural := 10;
 
   -- gate_generation: 001, section 5.2, IGBT pulse generation
   constant GATE_GENERATION_LATENCY : positive := 1;

@@ -602,6 +602,10 @@ begin
         settings.regen_slope <= unsigned(held(15 downto 0));
         written(145)         <= '1';
       end if;
+      if (row(18) and column(2) and not sample_busy) = '1' then
+        settings.charge_samples <= unsigned(held(9 downto 0));
+        written(146)            <= '1';
+      end if;
       if (row(18) and column(4) and not sample_busy) = '1' then
         settings.use_table <= held(0);
         written(148)       <= '1';
@@ -771,6 +775,7 @@ begin
         settings.regen_start      <= (others => '0');
         settings.double_update    <= '0';
         settings.regen_slope      <= (others => '0');
+        settings.charge_samples   <= (others => '0');
         settings.use_table        <= '0';
         settings.k_flux           <= (others => '0');
         settings.u_share          <= (others => '0');

@@ -43,15 +43,15 @@ package body register_map_pkg is
 
   constant ACCESS_OF : access_t :=
   (
-    0 to 7 | 32 to 48 | 50 to 59 | 248 to 251 | 256 to 258 | 272 to 282 | 284 to 292                                             => REGISTER_READ_ONLY,
-    8 to 15 | 31 | 49 | 60 to 63 | 107 | 146 to 147 | 158 to 239 | 252 to 255 | 259 | 266 to 271 | 283 | 293 to 319 | 375 to 511 => REGISTER_NONE,
-    16 to 17 | 19 | 26 to 27 | 240 to 247 | 260 to 265                                                                           => REGISTER_AT_ONCE,
-    18 | 20 to 25 | 28 to 30 | 64 to 106 | 108 to 145 | 148 to 157 | 320 to 374                                                  => REGISTER_BETWEEN
+    0 to 7 | 32 to 48 | 50 to 59 | 248 to 251 | 256 to 258 | 272 to 282 | 284 to 292                                      => REGISTER_READ_ONLY,
+    8 to 15 | 31 | 49 | 60 to 63 | 107 | 147 | 158 to 239 | 252 to 255 | 259 | 266 to 271 | 283 | 293 to 319 | 375 to 511 => REGISTER_NONE,
+    16 to 17 | 19 | 26 to 27 | 240 to 247 | 260 to 265                                                                    => REGISTER_AT_ONCE,
+    18 | 20 to 25 | 28 to 30 | 64 to 106 | 108 to 146 | 148 to 157 | 320 to 374                                           => REGISTER_BETWEEN
   );
 
   constant RANGE_OF : range_t :=
   (
-    0 to 15 | 31 to 63 | 107 | 146 to 147 | 158 to 239 | 248 to 259 | 264 | 266 to 319 | 375 to 511                                              => to_unsigned(0, REGISTER_RANGE_W),
+    0 to 15 | 31 to 63 | 107 | 147 | 158 to 239 | 248 to 259 | 264 | 266 to 319 | 375 to 511                                                     => to_unsigned(0, REGISTER_RANGE_W),
     16 to 19 | 23 | 25 | 29 to 30 | 74 | 83 | 112 | 144 | 148 | 240 to 241 | 260 to 262 | 327 | 334 to 336 | 339 | 342 to 343 | 350 to 354 | 368 => to_unsigned(11, REGISTER_RANGE_W),
     20 to 22 | 28 | 67 to 69 | 71 | 90                                                                                                           => to_unsigned(2, REGISTER_RANGE_W),
     24 | 109 to 111                                                                                                                              => to_unsigned(3, REGISTER_RANGE_W),
@@ -69,7 +69,7 @@ package body register_map_pkg is
     100                                                                                                                                          => to_unsigned(10, REGISTER_RANGE_W),
     114                                                                                                                                          => to_unsigned(28, REGISTER_RANGE_W),
     124 to 129 | 131 | 133 | 136 to 137                                                                                                          => to_unsigned(19, REGISTER_RANGE_W),
-    134 | 320 | 331                                                                                                                              => to_unsigned(20, REGISTER_RANGE_W),
+    134 | 146 | 320 | 331                                                                                                                        => to_unsigned(20, REGISTER_RANGE_W),
     139                                                                                                                                          => to_unsigned(29, REGISTER_RANGE_W),
     155 | 326                                                                                                                                    => to_unsigned(31, REGISTER_RANGE_W),
     243 | 265 | 344 | 346                                                                                                                        => to_unsigned(15, REGISTER_RANGE_W),

@@ -60,6 +60,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "bus_reciprocal",
         "modulator",
         "compare",
+        "charge",
         "gates",
     ),
     # paper 000: what dead time and drops take, its compensation, the magnets' flux
