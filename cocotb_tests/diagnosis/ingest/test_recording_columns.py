@@ -138,6 +138,41 @@ def test_names_that_may_mean_something_else_need_their_unit():
     assert usual("I_A", "")[:2] == ("i_a", "")  # not a current in amperes
 
 
+IN_WORDS = {  # a header: canonical column and unit
+    "rpm": ("omega_e", "rpm"), "Motor Speed / rpm": ("omega_e", "rpm"), "n/min-1": ("omega_e", "min-1"),
+    "Electrical speed (rpm)": ("omega_e", "erpm"), "Output Speed (rad/s)": ("omega_e", "rad/s mech"),
+    "T measured (Nm)": ("torque", "Nm"), "Output Torque, N.mm": ("torque", "N.mm"),
+    "Test motor q-axis current": ("i_q", ""), "QAxisCurrent [A]": ("i_q", "A"), "I_d/A": ("i_d", "A"),
+    "Iq setpoint motor (A)": ("i_q_ref", "A"), "q-axis voltage reference (V)": ("u_q_ref", "V"),
+    "Motor phase current A": ("i_a", ""), "phase current C (A)": ("i_c", "A"), "Duty cycle phase U [%]": ("d_a", "%"),
+    "bus v (V) at drive": ("u_dc", "V"), "DC Link Voltage [V]": ("u_dc", "V"),
+    "Test Motor Temperature (Deg C)": ("temp_winding", "Deg C"),
+}  # fmt: skip
+OF_OTHERS = (
+    "Absorber q-axis current", "Test motor FET temp (C)", "Motor drive temperature (C)", "Output Speed set-point (rpm)",
+    "Motor ID", "motor speed (rad/s)", "shaft electrical speed (rad/s)", "bus i DC (A)", "battery current (A)",
+    "motor phase-phase voltage (V) rms", "brake (V)", "Output Torque", "Motor current (A)",
+)  # fmt: skip
+
+
+def test_names_in_words_are_told_by_every_word():
+    for column, expected in IN_WORDS.items():
+        assert (usual(column, "") or ())[:2] == expected, column
+    assert [column for column in OF_OTHERS if usual(column, "")] == []
+    assert usual("Output Torque", "N.mm")[:2] == ("torque", "N.mm")  # by a line of units
+
+
+def test_two_names_in_words_of_one_quantity(tmp_path, nominal):
+    table = dq_made(400)
+    twice = table | {"Stator temperature (C)": np.full(400, 30.0), "Winding temperature (C)": np.full(400, 31.0)}
+    recording = load_recording(write(tmp_path / "r.csv", twice), nominal)
+    assert "temp_winding" not in recording.columns
+    assert any("could both be temp_winding: none is used" in note for note in recording.meta["notes"])
+    speeds = {k: v for k, v in table.items() if k != "omega_e"} | dict.fromkeys(("Shaft rpm", "Motor rpm"), 9.0)
+    with pytest.raises(RecordingError, match="'Motor rpm' and 'Shaft rpm' could both be omega_e"):
+        load_recording(write(tmp_path / "s.csv", speeds), nominal)
+
+
 def test_no_name_is_usual_for_two_columns():
     names = [name for of in NAMES.values() for name in of] + [name for of, _ in TOLD_BY_UNIT.values() for name in of]
     assert len(names) == len(set(names)) and set(NAMES) <= set(COLUMNS)
@@ -256,7 +291,7 @@ def test_a_speed_without_a_unit_is_proposed_with_one(tmp_path, nominal):
 
 
 def test_a_dyno_sheet_is_told_what_its_missing_voltages_would_add(tmp_path):
-    (tmp_path / "dyno.csv").write_text("rpm,iq (A),T measured (Nm),bus (A)\n" + "100,1.5,0.2,0.1\n" * 8)
+    (tmp_path / "dyno.csv").write_text("rpm,i (A),T measured (Nm),bus (A)\n" + "100,1.5,0.2,0.1\n" * 8)
     with pytest.raises(RecordingError, match=r"torque, i_q and omega_e \(a dyno sheet\) give flux and friction"):
         load_recording(tmp_path / "dyno.csv", nominal_of(tmp_path))
 

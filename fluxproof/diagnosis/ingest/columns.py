@@ -33,11 +33,13 @@ from fluxproof.diagnosis.ingest.demand import LINE_VOLTAGES, PHASE_VOLTAGES, is_
 from fluxproof.diagnosis.ingest.entries import entry_of, nearest
 from fluxproof.diagnosis.ingest.stated import constants_of
 from fluxproof.diagnosis.ingest.units import COMMANDED, OF_BUS, conversion, known_units, split_unit
-from fluxproof.diagnosis.ingest.usual_names import TOLD, usual
+from fluxproof.diagnosis.ingest.usual_names import usual
+from fluxproof.diagnosis.ingest.words import LATER, is_speed
 from fluxproof.diagnosis.ingest.worth import worth
 from fluxproof.diagnosis.readers.table import Table, shown
 
 MOST_GUESSES = 6
+OF_SHAFT = ("omega_e", "torque")
 WORTH_NAMING = ("torque", "temp_winding", "omega_e", "u_dc")  # which a diagnosis does without if they are not found
 
 
@@ -223,15 +225,24 @@ def _usual_names(plan, left, nominal, path) -> None:
         named = usual(column, left[column].strip())
         if named and named[0] not in plan.sources:
             found.setdefault(named[0], []).append((named[2], column, named[1]))
+    doubts = {}
     for name, candidates in found.items():
         (rank, column, unit), *others = sorted(candidates)
         if others and others[0][0] == rank:
-            raise _doubtful(path, [column, others[0][1]], name)
+            doubts[name] = _doubtful(path, [column, others[0][1]], name)
+            if rank < LATER:
+                raise doubts[name]
+            plan.notes.append(f"{shown(column)!r} and {shown(others[0][1])!r} could both be {name}: none is used")
+            continue
         source = _source(column, name, unit or COLUMNS[name], nominal, f"{path}: column {shown(column)!r}")
         plan.sources[name] = dataclasses.replace(source, by_name=not unit)
-    if found:
-        read = ", ".join(f"{name} from {shown(plan.sources[name].column)!r}" for name in found)
-        plan.notes.append(f"columns read by their usual names: {read}; override them in [columns]")
+    if doubts and missing_columns(set(plan.sources) | set(plan.assumed) | set(constants_of(nominal))):
+        raise next(iter(doubts.values()))
+    if read := [name for name in found if name not in doubts]:
+        text = ", ".join(f"{name} from {shown(plan.sources[name].column)!r}" for name in read)
+        plan.notes.append(f"columns read by their usual names: {text}; override them in [columns]")
+    if any(re.search(r"\boutput\b", plan.sources[name].column, re.I) for name in read if name in OF_SHAFT):
+        plan.notes.append("torque and speed of the output are taken as the motor's: with a gear, divide by its ratio")
 
 
 def _doubtful(path, columns, name) -> RecordingError:
@@ -282,8 +293,7 @@ def _nearly_usual(names) -> dict[str, str]:
     """{canonical name: column} of usual names that count only with a unit, such as "n", or lack a number: "vd1"."""
     out: dict[str, str] = {}
     for name in names:
-        bare = split_unit(name)[0].strip().lower()
-        if bare in TOLD and TOLD[bare][0] == "omega_e":
+        if is_speed(name):
             out.setdefault("omega_e", name)
         found = re.fullmatch(r"(.*[^\d_])_?\d", split_unit(name)[0])
         known = usual(found.group(1), "") if found else None

@@ -16,6 +16,7 @@ TURN = 2.0 * math.pi
 DEGREE = math.pi / 180.0
 RPM = TURN / 60.0
 PEAK = math.sqrt(2.0)
+POUND_FOOT = 0.45359237 * 9.80665 * 0.3048
 
 # quantity -> {unit: factor}; units in OF_SHAFT are also multiplied by the pole pairs.
 FACTORS = {
@@ -74,6 +75,9 @@ FACTORS = {
     },
     "rad/s": {
         "rad/s": 1.0,
+        "rad.s": 1.0,
+        "rad/sec": 1.0,
+        "rad s-1": 1.0,
         "rad/s el": 1.0,
         "mrad/s": 1e-3,
         "deg/s": DEGREE,
@@ -89,6 +93,9 @@ FACTORS = {
         "U/min": RPM,
         "r/min": RPM,
         "rad/s mech": 1.0,
+        "rad.s mech": 1.0,
+        "rad/sec mech": 1.0,
+        "rad s-1 mech": 1.0,
         "deg/s mech": DEGREE,
         "turn/s": TURN,
         "turn/s mech": TURN,
@@ -113,6 +120,13 @@ FACTORS = {
         "N*m": 1.0,
         "N.m": 1.0,
         "N·m": 1.0,
+        "N-m": 1.0,
+        "lb-ft": POUND_FOOT,
+        "lbf-ft": POUND_FOOT,
+        "ft-lb": POUND_FOOT,
+        "in-lb": POUND_FOOT / 12.0,
+        "lb-in": POUND_FOOT / 12.0,
+        "oz-in": POUND_FOOT / 192.0,
         "mNm": 1e-3,
         "Nmm": 1e-3,
         "N.mm": 1e-3,
@@ -134,6 +148,9 @@ OF_SHAFT = {
     "U/min",
     "r/min",
     "rad/s mech",
+    "rad.s mech",
+    "rad/sec mech",
+    "rad s-1 mech",
     "deg/s mech",
     "turn/s",
     "turn/s mech",
