@@ -14,6 +14,7 @@ from fluxproof.diagnosis.conventions.apply import edit
 from fluxproof.diagnosis.conventions.table import READINGS
 from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
 from fluxproof.diagnosis.improve.improve import _set
+from fluxproof.diagnosis.ingest.entries import entries_of
 from fluxproof.diagnosis.ingest.units import OF_BUS
 from fluxproof.diagnosis.ingest.usual_names import NAMES, TOLD_BY_UNIT, usual
 from fluxproof.diagnosis.loading.load import load_recording
@@ -69,6 +70,15 @@ def test_wrong_columns_name_the_entry(tmp_path, lines):
     assert "[columns]" in message and "\n" not in message
     for word in WRONG_COLUMNS[lines]:
         assert word in message
+
+
+def test_an_option_names_a_column(tmp_path):
+    assert entries_of(["Dev1_ai0=u_ab", "n = omega_e [rpm]", "a=b=i_q", "Spare="]) == {
+        "Dev1_ai0": "u_ab", "n": {"name": "omega_e", "unit": "rpm"}, "a=b": "i_q", "Spare": "",
+    }  # fmt: skip
+    for text in ("u_ab", "Dev1_ai0=u_xy", "=u_ab"):
+        with pytest.raises(RecordingError, match="--column .* expected NAME=CANONICAL"):
+            entries_of([text])
 
 
 def test_files_of_several_loggers_share_the_columns(tmp_path):
@@ -302,6 +312,8 @@ REFUSED = {
     "no voltages": ("t i_d i_q omega_e", "u_q_ref alone would show R and flux.*dyno sheet"),
     "one axis": ("t i_q u_d_ref u_q_ref omega_e", "i_d would show L_d and the angle"),
     "no speed": ("t i_d i_q u_d_ref u_q_ref", "omega_e would show steady effects"),
+    "instrument": ("t Dev1_ai0", "'Dev1_ai0' may be terminal voltages.*--column 'Dev1_ai0=u_ab'"),
+    "two probes": ("t ai0 ai1", "--column 'ai0=u_ab' --column 'ai1=u_bc'"),
     "supply": ("t i_dc u_dc", "supply alone show nothing.*EMF run"),
 }
 

@@ -259,8 +259,9 @@ def _demand(plan, names, path) -> None:
         why = f" ({plan.notes[-1]})" if plan.notes else ""
         raise RecordingError(
             f"{path}: missing {' and '.join(missing)}; found columns {found or 'none'}{_guesses(missing, names)}; "
-            f"name them in [columns] of drive.toml, or give a value that was constant in [constants]{why}"
-            f"{worth(missing, names, set(plan.sources) | set(plan.assumed))}"
+            f"name them by --column NAME=... or in [columns] of drive.toml, or give a value that was constant in "
+            f"[constants]{why}"
+            f"{worth(missing, names, set(plan.sources) | set(plan.assumed), plan.wanted())}"
         )
 
 

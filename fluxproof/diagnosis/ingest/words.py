@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Column names in words, as sheets of a bench have them: "Test motor q-axis current", "T measured (Nm)", "Bus v (V) at drive".
+"""Column names in words, as sheets of a bench have them: "Test motor q-axis current", "bus v (V) at drive".
 
 A name counts if every word of it is known: one quantity, the words that tell which of its kind it is, and words that
 change nothing ("test motor", "measured").  One word that is not known, such as "absorber" or "FET", may make it the
@@ -22,7 +22,9 @@ NEUTRAL = frozenset(
 PLACE = frozenset("at in drive inverter controller".split())
 SHAFT = frozenset("output shaft rotor mechanical mech welle".split())
 ELECTRICAL = frozenset("electrical electric elec el elektrisch".split())
-REFERENCE = frozenset("ref reference setpoint set point command commanded cmd target demand demanded desired soll".split())
+REFERENCE = frozenset(
+    "ref reference setpoint set point command commanded cmd target demand demanded desired soll".split()
+)
 BUS = frozenset("dc bus link dclink supply battery batt bat input zwischenkreis zk".split())
 CELL = frozenset("load cell sensor transducer flange".split())
 WINDING = frozenset("winding windings stator coil wicklung wdg motor".split())
