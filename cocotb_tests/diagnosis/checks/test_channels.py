@@ -195,3 +195,27 @@ def test_references_beyond_the_limit_in_most_rows_have_another_unit(tmp_path, no
     table["u_q_ref"] = 1.2 * table["u_dc"] * np.ones(len(table["t"]))
     recording = load_recording(write(tmp_path / "r.parquet", table), nominal)
     assert "voltage_limit" not in codes(recording)
+
+
+def blind_above(columns, window, nominal):
+    """Currents of legs whose duty leaves no time to sample them are half of what they are."""
+    out, delay = dict(columns), nominal.control.duty_applied_after_samples
+    for x in "abc":
+        late = np.roll(columns[f"d_{x}"], delay) > window
+        out[f"i_{x}"] = np.where(late, 0.5 * columns[f"i_{x}"] + 1.0, columns[f"i_{x}"])
+    return out
+
+
+def test_currents_without_a_sampling_window_follow_from_the_other_two(tmp_path, nominal):
+    table = made(speed=1250.0)
+    highest = np.max([table[f"d_{x}"] for x in "abc"])
+    window = highest - 0.04
+    assert window > 0.8
+    recording = load_recording(write(tmp_path / "r.csv", blind_above(table, window, nominal)), nominal)
+    (found,) = [p for p in recording.problems if p.code == "shunt_window"]
+    assert float(found.message.split("above ")[1].split()[0]) == pytest.approx(window, abs=0.005)
+    for name in ("i_a", "i_b", "i_c"):
+        np.testing.assert_allclose(recording[name], table[name], atol=0.1)
+    assert codes(load_recording(write(tmp_path / "h.csv", table), nominal)) == []
+    offset = table | {"i_a": table["i_a"] + 0.3}  # a sum that is off at all duties is the sensor's
+    assert "shunt_window" not in codes(load_recording(write(tmp_path / "o.csv", offset), nominal))

@@ -111,22 +111,22 @@ def _step(recording, flux, change) -> bool:
     while left.max() > least:
         at = int(np.argmax(left))
         size = float(change[at])
-        row = _jump(recording["theta_e"], at, size)
-        if row is not None and _sharp(flux, at, size):
-            _take(recording, row, size)
+        jump = _jump(recording["theta_e"], at, size)
+        if jump is not None and _sharp(flux, at, size):
+            _take(recording, *jump)
             return True
         left[max(at - SHORTEST, 0) : at + SHORTEST] = 0.0
     return False
 
 
-def _jump(theta, at: int, size: float) -> int | None:
-    """The row near ``at`` in which the recorded angle itself jumps by size, as a rotor cannot; None without one."""
+def _jump(theta, at: int, size: float) -> tuple[int, float] | None:
+    """(row, exact size) of a jump of the recorded angle itself near ``at``, as no rotor makes; None without one."""
     near = np.arange(max(at - 2 * GAP, 1), min(at + 2 * GAP, len(theta)))
     ahead = wrapped(theta[near] - theta[near - 1])
     excess = ahead - np.median(ahead)
     if abs(excess.sum() - size) > SHARP * abs(size):
         return None
-    return int(near[np.argmax(np.sign(size) * excess)])
+    return int(near[np.argmax(np.sign(size) * excess)]), float(excess.sum())
 
 
 def _take(recording, at: int, size: float) -> None:
