@@ -219,3 +219,35 @@ def test_currents_without_a_sampling_window_follow_from_the_other_two(tmp_path, 
     assert codes(load_recording(write(tmp_path / "h.csv", table), nominal)) == []
     offset = table | {"i_a": table["i_a"] + 0.3}  # a sum that is off at all duties is the sensor's
     assert "shunt_window" not in codes(load_recording(write(tmp_path / "o.csv", offset), nominal))
+
+
+def ridden(n=2000, most_a=np.inf, most_w=np.inf):
+    """A log of 20 Hz with random throttle, which a limit of the current or the power cuts off."""
+    rng = np.random.default_rng(8)
+    t = np.arange(n) * 0.05
+    knots = np.arange(0.0, t[-1] + 4.0, 2.0)
+    omega = np.interp(t, knots, rng.uniform(50.0, 500.0, len(knots)))
+    i_q = np.minimum(np.interp(t, knots, rng.uniform(0.2, 6.0, len(knots))), most_a)
+    i_q = np.minimum(i_q, (np.sqrt((omega * PSI) ** 2 + 4 * R * most_w / 1.5) - omega * PSI) / (2 * R))
+    table = {"t": t, "i_d": 0 * t, "i_q": i_q, "omega_e": omega}
+    table |= {"u_d_ref": -omega * L_Q * i_q, "u_q_ref": R * i_q + omega * PSI, "u_dc": np.full(n, BUS)}
+    return {k: v if k in ("t", "u_dc") else v + 0.002 * np.abs(v).max() * rng.normal(size=n) for k, v in table.items()}
+
+
+@pytest.mark.parametrize("limit", [{"most_a": 4.0}, {"most_w": 250.0}, {}])
+def test_rows_at_a_limit_are_told_and_used(tmp_path, nominal, limit):
+    recording = load_recording(write(tmp_path / "r.csv", ridden(**limit)), nominal)
+    found = [p for p in recording.problems if p.code in ("current_limit", "power_limit")]
+    if not limit:
+        assert found == []
+        return
+    ((name, value),) = limit.items()
+    (problem,) = found
+    assert problem.code == {"most_a": "current_limit", "most_w": "power_limit"}[name] and problem.action == "rows used"
+    stated = float(problem.message.split("limit, ")[1].split()[0])
+    assert stated == pytest.approx(value, rel=0.02) and recording.usable.all()
+
+
+def test_the_highest_step_of_a_plan_is_no_limit(tmp_path, nominal):
+    recording = load_recording(write(tmp_path / "r.csv", dq_made()), nominal)
+    assert not {"current_limit", "power_limit"} & set(codes(recording))
