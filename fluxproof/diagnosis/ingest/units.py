@@ -188,9 +188,12 @@ def known_units(column: str) -> str:
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """("i_a", "mA") of "i_a [mA]" or "i_a (mA)"; ("i_a", "") without a unit."""
+    """("i_a", "mA") of "i_a [mA]" or "i_a (mA)"; ("i_a", "") without a unit; "i_abc[0]" is a channel."""
     name = name.strip()
     inside = name[:-1] if name.endswith(("]", ")")) else ""
     start = max(inside.rfind("["), inside.rfind("("))
-    stem, unit = inside[: max(start, 0)].strip(), inside[start + 1 :].strip()
-    return (stem, unit) if stem and not any(c in unit for c in "])") else (name, "")
+    stem, unit = inside[: max(start, 0)], inside[start + 1 :].strip()
+    channel = unit.isdigit() and stem == stem.rstrip()
+    if not stem.strip() or channel or any(c in unit for c in "])"):
+        return name, ""
+    return stem.strip(), unit

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 
+from fluxproof.diagnosis.ground.recording import COLUMNS
 from fluxproof.diagnosis.ingest.demand import COMMANDED, CURRENTS
 from fluxproof.quote import shown
 
@@ -16,6 +17,10 @@ TORQUE = re.compile(r"torque|drehmoment|\bN[ .*]?mm?\b", re.I)
 MAP = (
     ". These are the columns of a flux map, which belongs to the drive and is no recording: name the file in the drive "
     'file, [plant.machine] flux_map = "FILE", with the columns i_d_a, i_q_a, psi_d_wb, psi_q_wb'
+)
+MATRICES = (
+    ". Matrices over two axes are read with a vector for each axis if these have different lengths, else with both "
+    "axes as matrices too ([i_q, omega_e] = meshgrid(...)), or as a table with one row per operating point"
 )
 NO_NAMES = (
     ". The columns have no names: a log needs a header, or [columns] with their numbers; a matrix over speed and "
@@ -48,6 +53,8 @@ def worth(missing: list[str], names: dict[str, str], have: set[str], taken=()) -
     """The end of a refusal; names: columns of the file with units; have: canonical columns, found in those taken."""
     if sum(bool(FLUX.fullmatch(name)) for name in names) >= 2:
         return MAP
+    if sum(name.endswith("[1]") and name[:-3] in COLUMNS for name in names) >= 2:
+        return MATRICES
     if names and all(name.isdigit() for name in names):
         return NO_NAMES
     lacks_voltages = any(text.startswith("voltages") for text in missing)
