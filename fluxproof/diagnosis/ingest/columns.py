@@ -203,19 +203,34 @@ def _ready_made(plan, left, nominal, path) -> bool:
                 best, hits = known, fits
     if best is None or not hits:
         return False
+    _ignore(plan, best, left)
     for key, columns in hits.items():
         name, unit = best.COLUMNS[key]
         if len(columns) > 1:
             raise _doubtful(path, columns, name)
         if name not in plan.sources:
             where = f"{path}: column {shown(columns[0])!r}"
-            plan.sources[name] = _source(columns[0], name, _unit_of(columns[0], left) or unit, nominal, where)
+            stated = _unit_of(columns[0], left)
+            if key in getattr(best, "SHAFT", ()) and conversion(name, f"{stated} mech", 1) is not None:
+                stated += " mech"
+            plan.sources[name] = _source(columns[0], name, stated or unit, nominal, where)
     plan.used = f"{plan.used}, {best.NAME}" if plan.used == "[columns]" else best.NAME
     plan.notes += [f"column names as in {best.NAME}", *getattr(best, "NOTES", [])]
     plan.assumed |= {k: v for k, v in getattr(best, "ASSUMED", {}).items() if k not in plan.sources}
     plan.sample_time_s = getattr(best, "SAMPLE_TIME_S", None)
     plan.run = next((c for c in left if c == getattr(best, "RUN", None)), None)
     return True
+
+
+def _ignore(plan, known, left) -> None:
+    """Leave out what has a canonical name and is something else in a known log."""
+    key = getattr(known, "KEY", plain)
+    for column in left:
+        why = getattr(known, "IGNORED", {}).get(key(split_unit(column)[0]))
+        for name in [name for name, source in plan.sources.items() if why and source.column == column]:
+            del plan.sources[name]
+        if why:
+            plan.notes.append(f"{known.NAME}: column {shown(column)!r} is not used: {why}")
 
 
 def _usual_names(plan, left, nominal, path) -> None:
