@@ -251,3 +251,10 @@ def test_rows_at_a_limit_are_told_and_used(tmp_path, nominal, limit):
 def test_the_highest_step_of_a_plan_is_no_limit(tmp_path, nominal):
     recording = load_recording(write(tmp_path / "r.csv", dq_made()), nominal)
     assert not {"current_limit", "power_limit"} & set(codes(recording))
+
+
+def test_a_speed_in_counts_a_second_is_refused(tmp_path, nominal):
+    table = dq_made()
+    recording = load_recording(write(tmp_path / "r.csv", table | {"omega_e": 8192.0 * table["omega_e"]}), nominal)
+    assert [p.code for p in recording.problems if p.fatal] == ["speed_range"]
+    assert "such as counts a second" in recording.problems[-1].message

@@ -20,7 +20,11 @@ COLUMNS = {
     "velocity": ("omega_e", "rad/s mech"),
 }
 SHAFT = ("velocity",)  # whose unit, if a header states it, is that of the shaft
-NOTES = ["SimpleFOC: currents without a unit are taken in mA, as its monitor prints them"]
+SAMPLE_TIME_S = 0.01  # of a log without a time: a serial line prints no faster, and steady points need no more
+NOTES = [
+    "SimpleFOC: currents without a unit are taken in mA, as its monitor prints them; rows without a time are taken as "
+    "10 ms apart"
+]
 
 
 def KEY(name: str) -> str:
