@@ -50,12 +50,14 @@ def _impossible(recording, nominal) -> bool:
     if not recording.has("omega_e") or not recording.usable.any() or "inverter" in recording.lacks:
         return False
     omega = float(np.nanmedian(np.abs(recording["omega_e"][recording.usable])))
-    turns = omega * nominal.sample_time_s / (2.0 * np.pi)
+    period = min(nominal.sample_time_s, 1.0 / nominal.inverter.pwm_frequency_hz)
+    turns = omega * period / (2.0 * np.pi)
     if turns < MOST_TURNS:
         return False
     message = (
-        f"the speed is {omega:.3g} rad/s electrical in half of the rows, {turns:.2g} turns in each period of the control: "
-        "omega_e has another unit, such as counts a second; name it in [columns]"
+        f"the speed is {omega:.3g} rad/s electrical in half of the rows, {turns:.2g} turns in each period of "
+        f"{period:.3g} s: omega_e has another unit, such as counts a second; name it in [columns], or correct "
+        "pwm_frequency_hz"
     )
     recording.problems.append(Problem("speed_range", message, "omega_e", 0, len(recording), fatal=True))
     return True
