@@ -19,6 +19,7 @@ from golden_model.control import (
     decoupling,
     position_control,
     position_trajectory,
+    regeneration_limit,
     speed_pi,
     torque_reference,
     voltage_limit,
@@ -62,7 +63,7 @@ from golden_model.io import (
     u_dc_processing,
 )
 from golden_model.kernel import kernel
-from golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
+from golden_model.modulation import bootstrap_charge, gate_generation, pwm_compare, svm, svm_delay_compensation
 from golden_model.transforms import clarke, flux_inverse_park, flux_park, inverse_park, park, sincos
 
 # Instance of the top -> (its block, the instances it waits for).  A block starts when the last of them is done.
@@ -82,8 +83,9 @@ WIRING = {
     "position_regulator": (position_control, ("latch",)),
     "trajectory": (position_trajectory, ("position_regulator",)),
     "speed_regulator": (speed_pi, ("speed_measurement", "current_circle", "position_regulator")),
+    "regeneration": (regeneration_limit, ("speed_regulator", "bus_voltage")),
     "references": (torque_reference, ("speed_regulator", "bus_voltage")),
-    "current_regulators": (current_pi, ("rotor_frame", "speed_regulator", "current_circle")),
+    "current_regulators": (current_pi, ("rotor_frame", "regeneration", "current_circle")),
     "resistance": (winding_resistance, ("latch",)),
     "merged_flux": (flux_park, ("trig",)),
     "models": (flux_models, ("rotor_frame", "merged_flux", "resistance")),
@@ -112,7 +114,7 @@ WIRING = {
     "monitor": (flux_monitor, ("inverter_loss", "compensation", "merge", "bus_reciprocal")),
     "checks": (sample_checks, ("conditioning", "bus_voltage")),
     "zero_check": (offset_check, ("conditioning", "speed_measurement")),
-    "motion": (motion_checks, ("speed_regulator",)),
+    "motion": (motion_checks, ("regeneration",)),
     "emf": (emf_check, ("circle",)),
     "load": (load_check, ("motion", "conditioning", "angle")),
     "chopper": (brake_chopper, ("bus_voltage",)),
@@ -131,7 +133,7 @@ EARLY = {
     ("rotor_frame", "trig"): sincos.SECOND,
     ("merged_flux", "trig"): sincos.SECOND,
     ("current_regulators", "rotor_frame"): 1,
-    ("current_regulators", "speed_regulator"): 1,
+    ("current_regulators", "regeneration"): 1,
     ("models", "rotor_frame"): 1,
     ("models", "merged_flux"): 2,
     ("circle", "current_regulators"): 1,
@@ -139,7 +141,13 @@ EARLY = {
     ("stator_voltage", "circle"): 1,
 }
 
-AT_THE_CLOCK = (sample_guard, host_watch, fault_latch, gate_generation)  # wired in golden_model/clocked.py
+AT_THE_CLOCK = (
+    sample_guard,
+    host_watch,
+    fault_latch,
+    bootstrap_charge,
+    gate_generation,
+)  # wired in golden_model/clocked.py
 MODULES = (*dict.fromkeys(module for module, _ in WIRING.values()), *AT_THE_CLOCK)
 
 
@@ -152,8 +160,12 @@ def schedule() -> dict[str, tuple[int, int]]:
     return times
 
 
-# Two Park transforms whose outputs the top renames; the others' outputs already have the names of their use.
-RENAMED = {"compensation_dq": ("u_comp_d", "u_comp_q"), "direction_functions": ("d_d", "d_q")}
+# Blocks whose outputs the top renames; the others' outputs already have the names of their use.
+RENAMED = {
+    "speed_regulator": ("torque_ref", "speed_limited"),
+    "compensation_dq": ("u_comp_d", "u_comp_q"),
+    "direction_functions": ("d_d", "d_q"),
+}
 
 
 def outputs_of(instance: str) -> tuple[str, ...]:
@@ -249,6 +261,8 @@ class State(NamedTuple):
     torque_max: int = 0
     of_current_reference: current_reference.State = current_reference.State()
     of_torque_reference: torque_reference.State = torque_reference.State()
+    regen_limited: int = 0
+    of_regeneration_limit: regeneration_limit.State = regeneration_limit.State()
     # The position loop's part, last for the same reason
     of_position_control: position_control.State = position_control.State()
     of_position_trajectory: position_trajectory.State = position_trajectory.State()
@@ -275,6 +289,7 @@ class Observed(NamedTuple):
     i_q: int
     i_q_ref: int
     speed_limited: int
+    regen_limited: int
     lambda_d: int
     lambda_q: int
     omega_chord: int
@@ -416,16 +431,19 @@ def step_table(state, sample, regs, config, of_speed, table):
             ),
             c.position_bits,
         )  # fmt: skip
-    speed_pi_state, (i_q_ref, speed_limited) = speed_pi.step(
-        state.of_speed_pi, omega_asked, omega_me, x.i_q_ext, most, regulates, x.run, state.torque_ff, r.speed_kp,
-        r.speed_ki,
+    speed_pi_state, (torque_ref, speed_limited) = speed_pi.step(
+        state.of_speed_pi, omega_asked, omega_me, x.i_q_ext, most, state.regen_limited, regulates, x.run,
+        state.torque_ff, r.speed_kp, r.speed_ki,
     )  # fmt: skip
-    torque_ref, table_current_state = i_q_ref, state.of_current_reference
+    i_q_asked, table_current_state = torque_ref, state.of_current_reference
     if c.references:
         table_current_state, (i_q_circle,) = current_reference.step(
             state.of_current_reference, state.i_q_table, i_q_max, r.use_table
         )
-        i_q_ref = i_q_circle if by_table else i_q_ref
+        i_q_asked = i_q_circle if by_table else torque_ref
+    regeneration_state, (i_q_ref, regen_limited) = regeneration_limit.step(
+        state.of_regeneration_limit, i_q_asked, omega_me, u_dc, r.i_max, r.regen_start, r.regen_slope
+    )
     current_pi_state, (u_pi_d, u_pi_q, u_int_d, u_int_q) = current_pi.step(
         state.of_current_pi, i_d, i_q, i_d_limited, i_q_ref, state.sat_d, state.sat_q, x.run, r.kp_d, r.ki_d, r.kp_q,
         r.ki_q,
@@ -492,8 +510,8 @@ def step_table(state, sample, regs, config, of_speed, table):
         state.of_offset_check, i_a, i_b, i_c, omega_me, x.run, r.omega_stall, r.offset_max
     )
     motion_checks_state, (motion_faults,) = motion_checks.step(
-        state.of_motion_checks, omega_me, omega_asked, regulates, speed_limited, x.run, r.omega_trip, r.omega_away,
-        r.runaway_samples, r.omega_stall, r.stall_samples,
+        state.of_motion_checks, omega_me, omega_asked, regulates, speed_limited, regen_limited, x.run, r.omega_trip,
+        r.omega_away, r.runaway_samples, r.omega_stall, r.stall_samples,
     )  # fmt: skip
     emf_check_state, (encoder_lost,) = emf_check.step(
         state.of_emf_check,
@@ -524,14 +542,16 @@ def step_table(state, sample, regs, config, of_speed, table):
         lambda_add_d=after.lambda_add_d, lambda_add_q=after.lambda_add_q, v_comp=after.v_comp, v_leg=after.v_leg,
         s_alpha=after.s_alpha, s_beta=after.s_beta, of_current_reference=table_current_state,
         of_torque_reference=references_state, i_d_table=i_d_table, i_q_table=i_q_table, torque_max=torque_max,
+        regen_limited=regen_limited, of_regeneration_limit=regeneration_state,
         of_position_control=position_state, of_position_trajectory=trajectory_state, position_ref=position_ref,
         omega_ff=omega_ff, torque_ff=torque_ff, at_rest=at_rest,
     )  # fmt: skip
     return following, Observed(
         i_a=i_a, i_b=i_b, i_c=i_c, current_at_rail=current_at_rail, u_dc=u_dc, u_max=u_max, u_dc_at_rail=u_dc_at_rail,
         u_dc_low=u_dc_low, theta_me=theta_me, omega_me=omega_me, i_d=i_d, i_q=i_q, i_q_ref=i_q_ref,
-        speed_limited=speed_limited, lambda_d=lambda_d, lambda_q=lambda_q, omega_chord=omega_chord, u_dec_d=u_dec_d,
-        u_dec_q=u_dec_q, u_comp_d=e.u_comp_d, u_comp_q=e.u_comp_q, u_int_d=u_int_d, u_int_q=u_int_q, u_d=u_d, u_q=u_q,
+        speed_limited=speed_limited, regen_limited=regen_limited, lambda_d=lambda_d, lambda_q=lambda_q,
+        omega_chord=omega_chord, u_dec_d=u_dec_d, u_dec_q=u_dec_q, u_comp_d=e.u_comp_d, u_comp_q=e.u_comp_q,
+        u_int_d=u_int_d, u_int_q=u_int_q, u_d=u_d, u_q=u_q,
         sat_d=sat_d, sat_q=sat_q, u_alpha=u_alpha, u_beta=u_beta, duty_a=duty_a, duty_b=duty_b, duty_c=duty_c,
         u_applied_alpha=e.u_applied_alpha, u_applied_beta=e.u_applied_beta, lambda_c_d=e.lambda_c_d,
         lambda_c_q=e.lambda_c_q, lambda_m_alpha=e.lambda_m_alpha, lambda_m_beta=e.lambda_m_beta,

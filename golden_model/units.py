@@ -42,6 +42,7 @@ ONE_IS = {
     "ohm/K": "U_base/I_base/K",
     "H": "U_base/omega_base/I_base",
     "V/A": "U_base/I_base",
+    "A/V": "I_base/U_base",
     "V/(A s)": "U_base/I_base/T_s",
     "1/Wb": "omega_base/U_base",
     "Nm s/rad": "1.5*pole_pairs*I_base*U_base/omega_base/omega_base",
@@ -65,7 +66,7 @@ _ONE_OF_REGISTER = {
     "position_kp": "omega_base/(2*pi*pole_pairs)",
     "move_speed": "2*pi/T_s",
     **dict.fromkeys(("dead_time", "min_pulse", "watchdog"), "1/clock_hz"),
-    **dict.fromkeys(("runaway_samples", "stall_samples", "emf_samples", "heartbeat"), "T_s"),
+    **dict.fromkeys(("runaway_samples", "stall_samples", "emf_samples", "heartbeat", "charge_samples"), "T_s"),
 }
 
 

@@ -4,16 +4,17 @@
     err     = omega_ref - omega_me
     u       = speed_kp*err + integral + torque_ff
     i_q_ref = limit(u, +-i_q_max)
-    integral += speed_ki*err      unless u is beyond the limit and err pushes further
+    integral += speed_ki*err      unless u is beyond the limit and err pushes further, or regen_limited and err brakes
 
 The limit i_q_max is what current_limit leaves beside i_d, in both modes.
 Torque mode (``speed_mode`` = 0): i_q_ref is ``i_q_ext``, limited, and the integral follows it, so that
-a change to speed mode is bumpless.  ``run`` = 0: output and integral are zero.  torque_ff, of a trajectory, acts in
+a change to speed mode is bumpless.  ``regen_limited``: in the last sample the bus voltage limited the braking
+current, see regeneration_limit.  ``run`` = 0: output and integral are zero.  torque_ff, of a trajectory, acts in
 speed mode within the same limit; it is zero without one.
 
 Formats: err saturated to PU; proportional part rounded half up and with torque_ff S(10,28), which holds every sum;
-increment rounded half up to S(1,28), where 2**-16 * ki still counts; the integral is kept within +-i_q_max; sum exact, rounded
-half up to PU.
+increment rounded half up to S(1,28), where 2**-16 * ki still counts; the integral is kept within +-i_q_max; sum exact,
+rounded half up to PU.
 """
 
 from typing import NamedTuple
@@ -34,14 +35,15 @@ class State(NamedTuple):
 
 
 @kernel
-def step(state, omega_ref, omega_me, i_q_ext, i_q_max, speed_mode, run, torque_ff, speed_kp, speed_ki):
+def step(state, omega_ref, omega_me, i_q_ext, i_q_max, regen_limited, speed_mode, run, torque_ff, speed_kp, speed_ki):
     err = saturate(omega_ref - omega_me, PU_W)
     proportional = round_half_up(speed_kp * err, DROP_P) + (torque_ff << PU_TO_INTEGRAL)
     moved = state.integral + round_half_up(speed_ki * err, DROP_I)
     asked = round_half_up(proportional + state.integral, PU_TO_INTEGRAL) if speed_mode else i_q_ext
     i_q_ref = clamp(asked, -i_q_max, i_q_max)
     limited = 1 if asked != i_q_ref else 0
-    held = (asked > i_q_max and err > 0) or (asked < -i_q_max and err < 0)
+    brakes = (err > 0 and omega_me < 0) or (err < 0 and omega_me >= 0)
+    held = (asked > i_q_max and err > 0) or (asked < -i_q_max and err < 0) or (regen_limited and brakes)
     limit = i_q_max << PU_TO_INTEGRAL
     integral = i_q_ref << PU_TO_INTEGRAL
     if speed_mode:
@@ -72,6 +74,7 @@ def stimuli(rng, _config):
         "speed_mode": 1,
         "run": 1,
         "i_q_ext": 12345,
+        "regen_limited": 0,
     }
     rows = []
     for target in (131071, 100, -131072, 0):
@@ -85,6 +88,9 @@ def stimuli(rng, _config):
         for k in range(24):
             err = int(rng.uniform(-1, 1) * wide) if k % 8 else int(rng.integers(-1, 2))
             rows.append({"omega_ref": err + 77, "omega_me": 77, **regs, "speed_mode": int(k != 20)})
+        for k in range(16):  # braking that the bus limits, in both directions, and driving beside it
+            err, omega = (int(s * rng.integers(1, 99)) for s in ((1, -1)[k % 2], (1, -1, 1, 0)[k // 2 % 4]))
+            rows.append({"omega_ref": err + omega, "omega_me": omega, **regs, "regen_limited": int(k % 3 > 0)})
     still, one = {**regs, "speed_ki": 0, "speed_mode": 1}, 1 << KP.frac_bits
     for torque_ff in (1, -1, 5000, -5000, PU.hi, PU.lo):
         for err in (0, 1, -1, 4000, -4000, PU.hi, PU.lo):
@@ -126,6 +132,7 @@ BLOCK = Block(
         Port("omega_me", PU, doc="electrical speed"),
         Port("i_q_ext", PU, doc="current reference of torque mode"),
         Port("i_q_max", PU, lo=0, doc="limit of the q axis, see current_limit"),
+        Port("regen_limited", BIT, doc="1: the bus voltage limited the braking current of the last sample"),
         Port("speed_mode", BIT, doc="1: speed control, 0: torque control"),
         Port("run", BIT, doc="0: output and integral zero"),
         Port("torque_ff", PU, doc="added in speed mode: torque or current of a trajectory's acceleration"),

@@ -111,10 +111,11 @@ _SETTINGS = """
     240 double_update
     250 use_table     254 k_flux         258 u_share      25c k_voltage      260 share_min    264 k_torque
     268 omega_learn   26c table_word     270 v_start        274 torque_step
+    23c regen_start   244 regen_slope     248 charge_samples
     280 position_mode 284 position_target                 288 position_kp    28c position_band  290 omega_most
     294 move_speed    298 move_step      29c jerk_bits      2a0 torque_lead    2a4 use_stops      2a8 stop_low
     2ac stop_high     2b0 k_inertia      2b4 k_viscous      2b8 coulomb
-"""  # 23c, 244 to 24c, 278, 27c, 2bc to 2dc, 2e8 to 3bc and 3f0 to 3fc are free
+"""  # 24c, 278, 27c, 2bc to 2dc, 2e8 to 3bc and 3f0 to 3fc are free
 _COMMANDS = {
     "enable": (0x040, Kind.COMMAND),
     "clear_trip": (0x044, Kind.PULSE),
@@ -161,6 +162,7 @@ _FLAGS = {
     "delta_held": 13,
     "brake_asked": 14,
     "double_used": 15,
+    "regen_limited": 16,
 }
 # Bits of the word "ring_state", likewise
 _RING_STATE = {"ring_recording": 0, "ring_ended": 1, "ring_full": 2, "ring_cause": 4}

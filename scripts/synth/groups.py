@@ -45,6 +45,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "position_regulator",
         "trajectory",
         "speed_regulator",
+        "regeneration",
         "current_regulators",
         "chord",
         "cross_coupling",
@@ -61,6 +62,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "bus_reciprocal",
         "modulator",
         "compare",
+        "charge",
         "gates",
     ),
     # paper 000: what dead time and drops take, its compensation, the magnets' flux
