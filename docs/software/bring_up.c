@@ -150,6 +150,7 @@ static void check_generics(void)
 #ifdef FLUXPROOF_TORQUE_TABLE
         {"REFERENCES", AT(references), 1},
 #endif
+        {"POSITION_LOOP", AT(position_loop), FLUXPROOF_POSITION_LOOP},
 #ifdef FLUXPROOF_ENCODER /* the drive file has front ends: the core must be a fluxproof_board with them */
         {"ENCODER", AT(encoder), FLUXPROOF_ENCODER},
         {"CURRENTS", AT(currents), FLUXPROOF_CURRENTS},

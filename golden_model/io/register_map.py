@@ -35,7 +35,7 @@ PATIENCE = fluxproof.SAMPLE_INTERVAL + 16  # clocks that a write waits for the e
 IDENTIFICATION = int.from_bytes(b"FLUX", "big")
 
 WORD = Format(0, 32, 0)
-GENERICS = ("adc_bits", "position_bits", "carrier_half", "clock_hz", "estimators", "references")
+GENERICS = ("adc_bits", "position_bits", "carrier_half", "clock_hz", "estimators", "references", "position_loop")
 
 
 class Kind(Enum):
@@ -112,7 +112,10 @@ _SETTINGS = """
     250 use_table     254 k_flux         258 u_share      25c k_voltage      260 share_min    264 k_torque
     268 omega_learn   26c table_word     270 v_start        274 torque_step
     23c regen_start   244 regen_slope     248 charge_samples
-"""  # 24c and 278 to 3bc and 3f0 to 3fc are free
+    280 position_mode 284 position_target                 288 position_kp    28c position_band  290 omega_most
+    294 move_speed    298 move_step      29c jerk_bits      2a0 torque_lead    2a4 use_stops      2a8 stop_low
+    2ac stop_high     2b0 k_inertia      2b4 k_viscous      2b8 coulomb
+"""  # 24c, 278, 27c, 2bc to 2dc, 2e8 to 3bc and 3f0 to 3fc are free
 _COMMANDS = {
     "enable": (0x040, Kind.COMMAND),
     "clear_trip": (0x044, Kind.PULSE),
@@ -141,7 +144,7 @@ _STATUS = """
     0b4 lambda_q      0b8 psi_m           0bc v_dead       0c0 v_comp
     0c8 telemetry_dropped                 0cc fault_flags      0d0 first_fault    0d4 early_samples
     0d8 irq_cause     0dc code_a          0e0 code_b           0e4 code_c         0e8 code_u_dc
-    0ec code_theta    3e4 ring_depth      3e8 ring_next    3ec ring_data
+    0ec code_theta    2e0 shaft_position  2e4 position_error  3e4 ring_depth      3e8 ring_next    3ec ring_data
 """
 # Bits of the word "flags", read together: name -> lowest bit.
 _FLAGS = {
@@ -233,6 +236,7 @@ def _read_only() -> list[Register]:
         word("clock_hz", 0x014, Kind.GENERIC, "frequency of the clock, Hz"),
         word("estimators", 0x018, Kind.GENERIC, "1: with estimators, 0: field-oriented control alone"),
         word("references", 0x01C, Kind.GENERIC, "1: with current references by a table of torque and flux limit"),
+        word("position_loop", 0x020, Kind.GENERIC, "1: with a position loop and its trajectory"),
         Register("flags", 0x080, Kind.STATUS, flags, "status flags of the core, read together"),
         Register("ring_state", 0x3E0, Kind.STATUS, ring_state, "what the ring of telemetry does, read together"),
         *(
