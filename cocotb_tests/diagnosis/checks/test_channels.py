@@ -249,8 +249,10 @@ def test_rows_at_a_limit_are_told_and_used(tmp_path, nominal, limit):
 
 
 def test_the_highest_step_of_a_plan_is_no_limit(tmp_path, nominal):
-    recording = load_recording(write(tmp_path / "r.csv", dq_made()), nominal)
-    assert not {"current_limit", "power_limit"} & set(codes(recording))
+    locked = dq_made() | {"omega_e": np.zeros(2000)}
+    for name, table in {"r.csv": dq_made(), "locked.csv": locked}.items():
+        recording = load_recording(write(tmp_path / name, table), nominal)
+        assert not {"current_limit", "power_limit"} & set(codes(recording)), name
 
 
 def test_a_speed_in_counts_a_second_is_refused(tmp_path, nominal):

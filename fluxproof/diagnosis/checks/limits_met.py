@@ -47,7 +47,7 @@ def _told(recording, size, name: str, unit: str, least: float) -> bool:
     if length.sum() < LEAST_SHARE * len(size):
         return False
     stretches = [omega[a : a + n] for a, n in zip(first, length, strict=True)]
-    if max(float(np.ptp(np.abs(x))) for x in stretches) < MOVES * float(np.abs(omega).max()):
+    if max(float(np.ptp(np.abs(x))) for x in stretches) <= MOVES * float(np.abs(omega).max()):
         return False
     longest = int(np.argmax(length))
     until = t[first[longest] + length[longest] - 1]

@@ -44,7 +44,7 @@ def check(recording, nominal) -> None:
     recording.joined[:-1] = True
     for lost in np.flatnonzero(gaps):  # the rhythm may be another behind a gap
         recording.joined[max((lost - first) // times, 0)] = False
-    message = f"{times} rows in each period of the PWM: one is kept, at the row where a new command begins"
+    message = f"{times} rows in each period of the PWM: one of them is used, the row where a new command begins"
     recording.problems.append(Problem("oversampled", message, "", first, rows - len(recording), "one of each is used"))
 
 

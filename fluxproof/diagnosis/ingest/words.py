@@ -36,7 +36,7 @@ TEMPERATURE = frozenset("temperature temp t temperatur".split())
 DUTY = frozenset(("duty", "tastgrad"))
 AXES = {"d": frozenset(("d", "direct")), "q": frozenset(("q", "quadrature"))}
 PHASES = {"a": ("a", "u", "l1"), "b": ("b", "v", "l2"), "c": ("c", "w", "l3")}
-JOINED = {  # words that are two
+JOINED: dict[str, str] = {  # words that are two
     "id": "i d", "iq": "i q", "ud": "u d", "uq": "u q", "vd": "v d", "vq": "v q", "daxis": "d", "qaxis": "q",
     "vdc": "v dc", "udc": "u dc", "vbus": "v bus", "ubus": "u bus", "vbat": "v bat", "ubat": "u bat",
 }  # fmt: skip
@@ -120,7 +120,7 @@ def _words(stem: str) -> list[str]:
     """The words of a name in lower case, the last part of a path; of "MotorSpeed" two."""
     last = re.split(r"[./]", stem)[-1]
     apart = re.sub(r"(?<=[a-z])(?=[A-Z][a-z])|(?<=[A-Z])(?=[A-Z][a-z]{2})", " ", last)
-    words = re.findall(r"[^\W_]+", apart.lower())
+    words: list[str] = re.findall(r"[^\W_]+", apart.lower())
     return " ".join(JOINED.get(word, word) for word in words).split()
 
 
