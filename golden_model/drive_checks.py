@@ -219,7 +219,13 @@ def _protection(drive):
         _refuse("[protection] watchdog_periods", p.watchdog_periods, "above 1; trip_watchdog = false ignores it")
 
 
+def _residual(drive):
+    """The residual takes the voltage of a period from the estimators."""
+    if drive.core.residual and not drive.core.estimators:
+        raise DriveError("[core] residual = true needs estimators = true")
+
+
 RULES = (
     _sample_time, _sampling, _carrier, _pulses, _samples_per_turn, _voltage, _current, _flux, _codes, _speed_loop,
-    _current_loop, _flux_loop, _adaline_steps, _protection, check_encoder, check_converters,
+    _current_loop, _flux_loop, _adaline_steps, _protection, _residual, check_encoder, check_converters,
 )  # fmt: skip
