@@ -238,8 +238,8 @@ def step(state, given, seen, sample, regs, config):
                 model_d=v.model_d, model_q=v.model_q, cos_theta=v.cos_theta, sin_theta=v.sin_theta, i_a=v.i_a,
                 i_b=v.i_b, i_c=v.i_c, i_alpha=v.i_alpha, i_beta=v.i_beta, i_d=v.i_d, i_q=v.i_q, omega_me=v.omega_me,
                 u_applied_alpha=u_applied_alpha, u_applied_beta=u_applied_beta, s_alpha=state.s_alpha,
-                s_beta=state.s_beta, rho=g.rho, voltage_known=voltage_known, current_at_rail=v.current_at_rail,
-                run=x.run,
+                s_beta=state.s_beta, rho=g.rho, sat_d=state.sat_d, sat_q=state.sat_q, voltage_known=voltage_known,
+                current_at_rail=v.current_at_rail, run=x.run,
             ),
             r,
         )  # fmt: skip

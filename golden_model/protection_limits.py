@@ -14,7 +14,7 @@ per sample on.
 import math
 
 from golden_model.estimators import motor_residual
-from golden_model.formats import LIMIT
+from golden_model.formats import LIMIT, PU
 from golden_model.io.emf_check import EMF_I, EMF_L, EMF_MIN, EMF_W, MEAN
 from golden_model.io.emf_check import SAMPLES as EMF_SAMPLES
 from golden_model.io.fault_latch import NAMES
@@ -35,9 +35,10 @@ EMF_OF_RATED, EMF_OF_LEG, EMF_OF_R, EMF_OF_PSI, EMF_OF_LI, EMF_OF_PSI_HALL = 0.0
 # So long at least; over the current loop's bandwidth; with Hall sensors; sectors in that time, whose EMF is not seen
 EMF_S, EMF_OF_LOOP, EMF_HALL_S, EMF_SECTORS = 2.8e-3, 1.4, 0.05, 1.0
 # The mean residual of a described motor: of the EMF at rated speed; of the voltage of dead time and devices; of R*i; of
-# the flux; of L*i at the limit; the sum of the currents: of the rated one, of each current
+# the flux; of L*i at the limit; the sum of the currents: of the rated one, of each current; a light load: of
+# the rated current; the angle that a mean covers
 RESIDUAL_OF_RATED, RESIDUAL_OF_LEG, RESIDUAL_OF_R, RESIDUAL_OF_PSI, RESIDUAL_OF_LI = 0.002, 0.07, 0.06, 0.021, 0.015
-SUM_OF_RESIDUAL, SUM_OF_CURRENT = 0.004, 0.001
+SUM_OF_RESIDUAL, SUM_OF_CURRENT, LIGHT, SECTOR = 0.004, 0.001, 0.1, math.pi / 3.0
 ALWAYS_REPORTED = ("trip", "early")  # the pin always trips, a rejected sample never does
 
 
@@ -119,6 +120,10 @@ def residual_limits(drive):
     keys = f"[machine] resistance_ohm; [inverter] r_switch_ohm, r_diode_ohm; {sample}"
     yield _fitting("residual_i", ohm * t_s, "H", b.flux_wb / b.current_a, f.OF_I, keys)
     keys = "[machine] rated_current_a"
+    yield Entry("residual_light", LIGHT * m.rated_current_a, "A", b.current_a, keys)
+    slow, speed = SECTOR / (2**f.MEAN * t_s), base_keys(drive, "omega_me_rad_s")
+    most = PU.hi * PU.lsb * b.omega_me_rad_s
+    yield Entry("residual_slow", min(slow, most), "rad/s", b.omega_me_rad_s, f"{sample}; {speed}")
     yield _fitting("residual_sum_max", SUM_OF_RESIDUAL * m.rated_current_a, "A", b.current_a, f.SUM_LEAST, keys)
     yield Entry("residual_sum_i", SUM_OF_CURRENT, "1", 1.0, "none: a share of the current")
     lasts = min(p.residual_s, f.SAMPLES.hi * t_s)

@@ -941,6 +941,18 @@ extern "C" {
 #define FLUXPROOF__RESIDUAL_LEG__VALUE_bw 17
 #define FLUXPROOF__RESIDUAL_LEG__VALUE_reset 0x0
 
+// reg - fluxproof::residual_light
+#define FLUXPROOF__RESIDUAL_LIGHT__VALUE_bm 0xffffffff
+#define FLUXPROOF__RESIDUAL_LIGHT__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_LIGHT__VALUE_bw 32
+#define FLUXPROOF__RESIDUAL_LIGHT__VALUE_reset 0x0
+
+// reg - fluxproof::residual_slow
+#define FLUXPROOF__RESIDUAL_SLOW__VALUE_bm 0xffffffff
+#define FLUXPROOF__RESIDUAL_SLOW__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_SLOW__VALUE_bw 32
+#define FLUXPROOF__RESIDUAL_SLOW__VALUE_reset 0x0
+
 // reg - fluxproof::ring_arm
 #define FLUXPROOF__RING_ARM__VALUE_bm 0x1
 #define FLUXPROOF__RING_ARM__VALUE_bp 0
@@ -1658,7 +1670,9 @@ typedef struct {
     uint32_t residual_power;
     uint32_t residual_sum;
     uint32_t residual_leg;
-    uint8_t RESERVED_37c_3bf[0x44];
+    uint32_t residual_light;
+    uint32_t residual_slow;
+    uint8_t RESERVED_384_3bf[0x3c];
     uint32_t ring_arm;
     uint32_t ring_stop;
     uint32_t ring_faults;

@@ -8,7 +8,8 @@
     sixth     = e e^(j 6 theta)                                   order -6 of the rotor, -5 of the stator
     power     = |e|**2
     mean     += (x - mean)/128 of e, sixth, power and |i_a + i_b + i_c|
-    over      = |mean of e| > residual_min + residual_w |omega_me| + residual_i |i|
+    moved     = |i| >= residual_light and |omega_me| >= residual_slow
+    over      = moved and |mean of e| > residual_min + residual_w |omega_me| + residual_i |i|
                 or mean of |sum| > residual_sum_max + residual_sum_i |i|
 
 Divided by L, e is measured minus predicted current.  Flux and leg loss are those of the drive's data alone, so no
@@ -16,8 +17,10 @@ estimator that follows the motor hides a fault; s are the directions of two samp
 currents at both ends.  Noise of current and angle cancels in the mean, because what one sample has too much the next one
 lacks.  The sum of the currents is predicted as zero; with two sensors it is zero.
 ``motor_differs`` when ``residual_samples`` more samples were over than not; 0: never.  A sample counts if the voltage
-since the last one was known and no current is at its rail in both; otherwise e is zero and the means stay.  ``run`` = 0
-sets means and counter to zero.  |x| of a vector is the larger component and half the smaller one.
+since the last one was known and not at its limit, where a leg that does not switch loses nothing by dead time, and if no
+current is at its rail in both; otherwise e is zero and means and counter stay.  While not
+``moved`` it is not certain what a leg loses, or a leg near its zero crossing is the mean: the means of e, sixth and power
+stay.  ``run`` = 0 sets means and counter to zero.  |x| of a vector is the larger component and half the smaller one.
 
 Formats: fluxes S(1,30), rotated ones saturated; carried S(2,30); e S(-3,20), an eighth of the flux base in a sample,
 saturated; power U(-4,36), cut; the mean of the sum U(1,20).  Multiples of theta are saturated at 2, which no sine reaches.
@@ -28,6 +31,7 @@ from collections import namedtuple
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
+from golden_model.control.current_pi import SAT
 from golden_model.control.dead_time_compensation import S_ALPHA, S_BETA
 from golden_model.estimators.flux_models import DROP_MODEL, MODEL
 from golden_model.estimators.v_dead_adaline import V_LEVEL
@@ -120,25 +124,29 @@ def step(state, inputs, regs):
 
     sum_d, sum_q, sum_sixth_d, sum_sixth_q = s.sum_d, s.sum_q, s.sum_sixth_d, s.sum_sixth_q
     sum_power, sum_sum = s.sum_power, s.sum_sum
-    if used:
+    current = min(length(x.i_d, x.i_q), PU_HI)
+    speed = x.omega_me if x.omega_me >= 0 else -1 - x.omega_me
+    moved = current >= r.residual_light and speed >= r.residual_slow
+    if used and moved:
         sum_d += e_d - (sum_d >> MEAN)
         sum_q += e_q - (sum_q >> MEAN)
         sum_sixth_d += sixth_d - (sum_sixth_d >> MEAN)
         sum_sixth_q += sixth_q - (sum_sixth_q >> MEAN)
         sum_power += power - (sum_power >> MEAN)
+    if used:
         sum_sum += total - (sum_sum >> MEAN)
     if not x.run:
         sum_d = sum_q = sum_sixth_d = sum_sixth_q = sum_power = sum_sum = 0
 
-    current = min(length(x.i_d, x.i_q), PU_HI)
-    speed = x.omega_me if x.omega_me >= 0 else -1 - x.omega_me
     most = r.residual_min + ((speed * r.residual_w) >> DROP_OMEGA) + ((current * r.residual_i) >> DROP_I)
     sum_most = r.residual_sum_max + ((current * r.residual_sum_i) >> DROP_SUM_I)
-    over = length(sum_d >> MEAN, sum_q >> MEAN) > most or sum_sum >> DROP_SUM > sum_most
-    count = min(s.count + 1, SAMPLES_HI) if over else max(s.count - 1, 0)
+    over = (moved and length(sum_d >> MEAN, sum_q >> MEAN) > most) or sum_sum >> DROP_SUM > sum_most
+    count = s.count
+    if used:
+        count = min(count + 1, SAMPLES_HI) if over else max(count - 1, 0)
     if not x.run or r.residual_samples == 0:
         count = 0
-    known = 1 if sound and x.voltage_known else 0
+    known = 1 if sound and x.voltage_known and x.sat_d == 0 and x.sat_q == 0 else 0
     following = State(
         carried_alpha, carried_beta, known, x.s_alpha, x.s_beta, sum_d, sum_q, sum_sixth_d, sum_sixth_q, sum_power,
         sum_sum, count,
@@ -161,6 +169,7 @@ INPUTS = (
     S_ALPHA,
     S_BETA,
     RHO,
+    *(Port(f"sat_{x}", SAT, lo=-1, hi=1, doc=f"limit of the coming voltage, {x} axis: 1 upper, -1 lower") for x in "dq"),
     Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
     Port("current_at_rail", Format(0, 3, 0), doc="bit x: ADC code of phase x at either end"),
     Port("run", BIT, doc="1: the gates are switching"),
@@ -172,6 +181,8 @@ REGISTERS = (
     Port("residual_min", LEAST, doc="voltage that the mean residual may have at rest without current, times t_s"),
     Port("residual_w", OF_OMEGA, doc="the same for each electrical speed"),
     Port("residual_i", OF_I, doc="the same for each current"),
+    Port("residual_light", PU, lo=0, doc="current below which the loss of a leg is not certain"),
+    Port("residual_slow", PU, lo=0, doc="electrical speed below which a mean sees a leg at one current"),
     Port("residual_sum_max", SUM_LEAST, doc="mean that the sum of the currents may have without current"),
     Port("residual_sum_i", SUM_OF_I, doc="the same for each current"),
     Port("residual_samples", SAMPLES, doc="samples over a limit, more than others, that are another motor; 0: off"),
@@ -198,6 +209,7 @@ def stimuli(rng, _config):
     for k in range(60):  # all at an end; drawn, of all sizes
         rows.append(rest | {n: int(rng.choice(v)) for n, v in ends.items()} | {"current_at_rail": 0})
         rows.append(rest | {n: int(rng.integers(lo >> k % 12, (hi >> k % 12) + 1)) for n, (lo, hi) in ends.items()})
+        rows[-1] |= {"sat_d": k % 7 == 0, "sat_q": -(k % 8 == 0)}
         if k % 5 == 4:
             rows.append(rest | {"run": int(rng.integers(2)), "voltage_known": int(rng.integers(2))})
     for k in range(90):  # a turning flux, its voltage, and a residual of every size
@@ -225,6 +237,14 @@ def stimuli(rng, _config):
             for most in (80, 700, 4000):
                 rows += [push | {name: size, share: min((most << drop) // abs(size), (1 << 24) - 1)}] * 9
             rows += [rest | {"run": 0}, rest]
+    push = rest | {"u_applied_alpha": -1 << 21, "t_s": 1 << 16, "residual_samples": 1}
+    for light in (0, 1, 500, PU.hi):  # on both sides of a light load
+        for current in (light - 1, light, light + 1):
+            current = max(0, min(current, PU.hi))
+            rows += [push | {"i_d": current, "residual_light": light}] * 4
+            rows += [push | {"i_q": -current, "residual_light": light, "i_a": current}] * 2
+            rows += [push | {"omega_me": current, "residual_slow": light}] * 4
+            rows += [push | {"omega_me": -current, "residual_slow": light}] * 4
     for total in (1, -1, 9, 600, -4000, PU.hi):  # the sum of the currents
         push = rest | {"i_a": total, "residual_samples": 2}
         for least in (0, abs(total) // 3, abs(total)):

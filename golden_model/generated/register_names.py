@@ -160,6 +160,8 @@ ADDRESSES = {
     "residual_power": 0x370,
     "residual_sum": 0x374,
     "residual_leg": 0x378,
+    "residual_light": 0x37C,
+    "residual_slow": 0x380,
     "ring_arm": 0x3C0,
     "ring_stop": 0x3C4,
     "ring_faults": 0x3C8,

@@ -113,8 +113,9 @@ _SETTINGS = """
     268 omega_learn   26c table_word     270 v_start        274 torque_step
     340 residual_min  344 residual_w     348 residual_i     34c residual_samples
     350 residual_sum_max                 354 residual_sum_i
-    378 residual_leg
-"""  # 23c, 244 to 24c, 278 to 33c, 37c to 3bc and 3f0 to 3fc are free
+    378 residual_leg  37c residual_light
+    380 residual_slow
+"""  # 23c, 244 to 24c, 278 to 33c, 384 to 3bc and 3f0 to 3fc are free
 _COMMANDS = {
     "enable": (0x040, Kind.COMMAND),
     "clear_trip": (0x044, Kind.PULSE),

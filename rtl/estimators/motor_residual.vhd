@@ -4,10 +4,12 @@
 --   u       = u_applied - residual_leg*s, with the directions s of two samples ago
 --   e       = e^(-j theta)(lambda + rho*i - carried of the last sample);  sixth = e*e^(j 6 theta);  power = |e|**2
 --   mean   += (x - mean)/128 of e, sixth, power and |i_a + i_b + i_c|
---   over    = |mean of e| > residual_min + residual_w*|omega_me| + residual_i*|i|
+--   moved   = |i| >= residual_light and |omega_me| >= residual_slow
+--   over    = moved and |mean of e| > residual_min + residual_w*|omega_me| + residual_i*|i|
 --             or mean of |sum| > residual_sum_max + residual_sum_i*|i|
 -- motor_differs when residual_samples more samples were over than not; 0: never.  A sample counts if the voltage since
--- the last one was known and no current is at its rail; otherwise e is zero and the means stay.  run = 0: all are zero.
+-- the last one was known and not at its limit and no current is at its rail; otherwise e is zero, means and counter stay.
+-- While not moved the means of e, sixth and power stay.  run = 0: means and counter are zero.
 -- |x| of a vector is the larger component and half the smaller one.  One multiplier makes the 31 products in turn: n
 -- numbers the clocks of a sample, the product whose factors clock n selects is there at clock n + 2.
 -- Formats: fluxes S(1,30), rotated ones saturated; carried S(2,30); e S(-3,20) saturated; power U(-4,36), cut.
@@ -42,6 +44,8 @@ entity motor_residual is
     s_alpha          : in  signed(PU_W - 1 downto 0);
     s_beta           : in  signed(PU_W - 1 downto 0);
     rho              : in  unsigned(RHO_W - 1 downto 0);
+    sat_d            : in  signed(1 downto 0);
+    sat_q            : in  signed(1 downto 0);
     voltage_known    : in  std_logic;
     current_at_rail  : in  unsigned(2 downto 0);
     run              : in  std_logic;
@@ -50,6 +54,8 @@ entity motor_residual is
     residual_min     : in  unsigned(16 downto 0);
     residual_w       : in  unsigned(23 downto 0);
     residual_i       : in  unsigned(23 downto 0);
+    residual_light   : in  signed(PU_W - 1 downto 0);
+    residual_slow    : in  signed(PU_W - 1 downto 0);
     residual_sum_max : in  unsigned(17 downto 0);
     residual_sum_i   : in  unsigned(21 downto 0);
     residual_samples : in  unsigned(11 downto 0);
@@ -112,7 +118,7 @@ architecture rtl of motor_residual is
   signal e_d, e_q                  : e_t;
   signal power                     : signed(MOTOR_RESIDUAL_POWER_W downto 0);
   signal most, sum_most, size_35   : limit_t;
-  signal used                      : std_logic;
+  signal used, limited, moved      : std_logic;
 
   function size (x : signed) return signed is
   begin
@@ -226,6 +232,7 @@ begin
       end case;
       less_1  <= smaller_is(i_d, i_q);
       current <= saturate(length(i_d, i_q, less_1), PU_W);
+      moved   <= '1' when current >= residual_light and size(omega_me) >= residual_slow else '0';
       total   <= size(resize(i_a, PU_W + 2) + i_b + i_c);
 
       -- The products, two clocks later
@@ -239,6 +246,7 @@ begin
         when 12 =>
           u_alpha        <= saturate(u_applied_alpha - round_half_up(prod, MOTOR_RESIDUAL_DROP_LEG), FLUX_W);
           s_before_alpha <= s_alpha;
+          limited        <= or (sat_d or sat_q);
         when 13 =>
           u_beta        <= saturate(u_applied_beta - round_half_up(prod, MOTOR_RESIDUAL_DROP_LEG), FLUX_W);
           s_before_beta <= s_beta;
@@ -281,19 +289,23 @@ begin
             sum_power   <= (others => '0');
             sum_sum     <= (others => '0');
           elsif used = '1' then
-            sum_d       <= averaged(sum_d, e_d);
-            sum_q       <= averaged(sum_q, e_q);
-            sum_sixth_d <= averaged(sum_sixth_d, sixth_d);
-            sum_sixth_q <= averaged(sum_sixth_q, sixth_q);
-            sum_power   <= averaged(sum_power, power);
+            if moved = '1' then
+              sum_d       <= averaged(sum_d, e_d);
+              sum_q       <= averaged(sum_q, e_q);
+              sum_sixth_d <= averaged(sum_sixth_d, sixth_d);
+              sum_sixth_q <= averaged(sum_sixth_q, sixth_q);
+              sum_power   <= averaged(sum_power, power);
+            end if;
             sum_sum     <= averaged(sum_sum, signed(resize(saturate_u(total, SUM_W), SUM_W + 1)));
           end if;
         when 36 =>
-          count <= counted(over, count);
+          if used = '1' then
+            count <= counted(over, count);
+          end if;
           if run = '0' or residual_samples = 0 then
             count <= (others => '0');
           end if;
-          known <= voltage_known and run and not (or current_at_rail);
+          known <= voltage_known and run and not (or current_at_rail) and not limited;
         when 37 => motor_differs <= '1' when count >= residual_samples and count /= 0 else '0';
         when others => null;
       end case;
@@ -302,7 +314,7 @@ begin
       less_34 <= smaller_is(shift_right(sum_d, MEAN), shift_right(sum_q, MEAN));
       size_35 <= resize(length(resize(shift_right(sum_d, MEAN), E_W), resize(shift_right(sum_q, MEAN), E_W), less_34),
                         limit_t'length);
-      over    <= '1' when size_35 > most or shift_right(sum_sum, MOTOR_RESIDUAL_DROP_SUM) > sum_most else '0';
+      over    <= '1' when (moved = '1' and size_35 > most) or shift_right(sum_sum, MOTOR_RESIDUAL_DROP_SUM) > sum_most else '0';
 
       if rst = '1' then
         n              <= 0;

@@ -140,6 +140,8 @@ package fluxproof_pkg is
     residual_min     : unsigned(16 downto 0);  -- voltage that the mean residual may have at rest without current, times t_s
     residual_w       : unsigned(23 downto 0);  -- the same for each electrical speed
     residual_i       : unsigned(23 downto 0);  -- the same for each current
+    residual_light   : signed(PU_W - 1 downto 0);  -- current below which the loss of a leg is not certain
+    residual_slow    : signed(PU_W - 1 downto 0);  -- electrical speed below which a mean sees a leg at one current
     residual_sum_max : unsigned(17 downto 0);  -- mean that the sum of the currents may have without current
     residual_sum_i   : unsigned(RHO_W - 1 downto 0);  -- the same for each current
     residual_samples : unsigned(11 downto 0);  -- samples over a limit, more than others, that are another motor; 0: off

@@ -663,6 +663,14 @@ begin
         settings.residual_leg <= unsigned(held(16 downto 0));
         written(222)          <= '1';
       end if;
+      if (row(27) and column(7) and not sample_busy) = '1' then
+        settings.residual_light <= signed(held(17 downto 0));
+        written(223)            <= '1';
+      end if;
+      if (row(28) and column(0) and not sample_busy) = '1' then
+        settings.residual_slow <= signed(held(17 downto 0));
+        written(224)           <= '1';
+      end if;
       if (row(30) and column(0)) = '1' then
         ring_arm <= held(0);
       end if;
@@ -807,6 +815,8 @@ begin
         settings.residual_sum_max <= (others => '0');
         settings.residual_sum_i   <= (others => '0');
         settings.residual_leg     <= (others => '0');
+        settings.residual_light   <= (others => '0');
+        settings.residual_slow    <= (others => '0');
         ring_arm                  <= '0';
         ring_stop                 <= '0';
         ring_faults               <= (others => '0');

@@ -44,20 +44,20 @@ package body register_map_pkg is
   constant ACCESS_OF : access_t :=
   (
     0 to 8 | 32 to 48 | 50 to 59 | 214 to 221 | 248 to 251 | 256 to 258 | 272 to 282 | 284 to 292                                                         => REGISTER_READ_ONLY,
-    9 to 15 | 31 | 49 | 60 to 63 | 107 | 143 | 145 to 147 | 158 to 207 | 223 to 239 | 252 to 255 | 259 | 266 to 271 | 283 | 293 to 319 | 343 | 375 to 511 => REGISTER_NONE,
+    9 to 15 | 31 | 49 | 60 to 63 | 107 | 143 | 145 to 147 | 158 to 207 | 225 to 239 | 252 to 255 | 259 | 266 to 271 | 283 | 293 to 319 | 343 | 375 to 511 => REGISTER_NONE,
     16 to 17 | 19 | 26 to 27 | 240 to 247 | 260 to 265                                                                                                    => REGISTER_AT_ONCE,
-    18 | 20 to 25 | 28 to 30 | 64 to 106 | 108 to 142 | 144 | 148 to 157 | 208 to 213 | 222 | 320 to 342 | 344 to 374                                     => REGISTER_BETWEEN
+    18 | 20 to 25 | 28 to 30 | 64 to 106 | 108 to 142 | 144 | 148 to 157 | 208 to 213 | 222 to 224 | 320 to 342 | 344 to 374                              => REGISTER_BETWEEN
   );
 
   constant RANGE_OF : range_t :=
   (
-    0 to 15 | 31 to 63 | 107 | 143 | 145 to 147 | 158 to 207 | 214 to 221 | 223 to 239 | 248 to 259 | 264 | 266 to 319 | 343 | 375 to 511 => to_unsigned(0, REGISTER_RANGE_W),
+    0 to 15 | 31 to 63 | 107 | 143 | 145 to 147 | 158 to 207 | 214 to 221 | 225 to 239 | 248 to 259 | 264 | 266 to 319 | 343 | 375 to 511 => to_unsigned(0, REGISTER_RANGE_W),
     16 to 19 | 23 | 25 | 29 to 30 | 74 | 83 | 112 | 144 | 148 | 240 to 241 | 260 to 262 | 327 | 334 to 336 | 339 | 342 | 350 to 354 | 368 => to_unsigned(11, REGISTER_RANGE_W),
     20 to 22 | 28 | 67 to 69 | 71 | 90                                                                                                    => to_unsigned(2, REGISTER_RANGE_W),
     24 | 109 to 111                                                                                                                       => to_unsigned(3, REGISTER_RANGE_W),
     26 to 27 | 243 | 265 | 344 | 346                                                                                                      => to_unsigned(15, REGISTER_RANGE_W),
     64 to 66 | 70 | 95 | 102 | 105 | 132 | 135 | 150 | 152 | 247 | 337 | 348 to 349 | 365 | 371 | 373 to 374                              => to_unsigned(22, REGISTER_RANGE_W),
-    72 | 82 | 91 | 98 | 101 | 103 to 104 | 106 | 115 to 122 | 138 | 154 | 156 to 157 | 208 | 222 | 242 | 323 | 370                        => to_unsigned(24, REGISTER_RANGE_W),
+    72 | 82 | 91 | 98 | 101 | 103 to 104 | 106 | 115 to 122 | 138 | 154 | 156 to 157 | 208 | 222 to 224 | 242 | 323 | 370                 => to_unsigned(24, REGISTER_RANGE_W),
     73                                                                                                                                    => to_unsigned(5, REGISTER_RANGE_W),
     75 | 212 | 263 | 324 | 328 to 329 | 340                                                                                               => to_unsigned(25, REGISTER_RANGE_W),
     76 | 80 to 81 | 84 to 89 | 97 | 108 | 123 | 140 | 142 | 149 | 151 | 153 | 209 to 210                                                  => to_unsigned(31, REGISTER_RANGE_W),
