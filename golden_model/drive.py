@@ -164,7 +164,7 @@ class Protection:
     stall_s: float = positive("s", "time at the current limit at standstill that is a stall", 0.1)
     encoder_lost_v: float | None = positive("V", "by which the EMF may be wrong at rest; from the data if none", None)
     encoder_lost_s: float | None = not_negative("s", "so long that the EMF is wrong; 0: no check", None)
-    residual_v: float | None = positive("V", "mean that the motor's residual may have at rest; 2 % of that at speed if none", None)
+    residual_v: float | None = positive("V", "mean of the motor's residual at rest; from the data if none", None)
     residual_s: float = not_negative("s", "so long that it is above its limits; 0: no check", 0.01)
     open_load_a: float | None = positive("A", "current that a connected phase reaches; 2 % of rated if none", None)
     current_offset_a: float | None = positive("A", "mean of a phase at rest; 1 % of the rated current if none", None)

@@ -26,7 +26,6 @@ from golden_model.estimators import (
 from golden_model.kernel import kernel
 from golden_model.transforms import flux_inverse_park, flux_park, park
 
-
 NO_RESIDUAL = (0,) * len(motor_residual.OUTPUTS)
 
 

@@ -435,7 +435,8 @@ def step_table(state, sample, regs, config, of_speed, table):
     if c.estimators:
         seen = estimation.Seen(
             i_a=i_a, i_b=i_b, i_c=i_c, i_alpha=i_alpha, i_beta=i_beta, i_d=i_d, i_q=i_q,
-            current_at_rail=current_at_rail, u_dc=u_dc, u_dc_at_rail=u_dc_at_rail, u_dc_low=u_dc_low, omega_me=omega_me, omega_chord=omega_chord,
+            current_at_rail=current_at_rail, u_dc=u_dc,
+            u_dc_at_rail=u_dc_at_rail, u_dc_low=u_dc_low, omega_me=omega_me, omega_chord=omega_chord,
             cos_theta=cos_theta, sin_theta=sin_theta, model_d=model_d, model_q=model_q, lambda_d=lambda_d,
             lambda_q=lambda_q, estimate_limited=estimate_limited, u_pi_d=u_pi_d, u_int_d=u_int_d, u_int_q=u_int_q,
             u_q=u_q, sat_d=sat_d, sat_q=sat_q,

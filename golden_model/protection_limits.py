@@ -101,7 +101,7 @@ def emf_limits(drive):
 
 
 def residual_limits(drive):
-    """By how much the motor may differ from its description, and for how long; fluxes of a sample are voltage times T_s."""
+    """By how much the motor may differ from its description, and for how long; fluxes are voltages times T_s."""
     p, b, m, i, t_s = drive.protection, drive.bases, drive.machine, drive.inverter, drive.sample_time_s
     volts, key, sample = p.residual_v, "[protection] residual_v", "[inverter] pwm_frequency_hz"
     if volts is None:

@@ -173,8 +173,14 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
     )  # fmt: skip
     core, entered, seen_core = clocked.step(state.of_core, now, regs, carrier_half)
     causes, (_, irq) = interrupts_step(
-        state.of_interrupts, w.tripped, w.fault_flags, w.setting_refused, w.running, i.motor_differs,
-        b.irq_mask, b.irq_clear,
+        state.of_interrupts,
+        w.tripped,
+        w.fault_flags,
+        w.setting_refused,
+        w.running,
+        i.motor_differs,
+        b.irq_mask,
+        b.irq_clear,
     )
     x, y, z = seen_position, seen_converters, seen_core
     wires = Wires(

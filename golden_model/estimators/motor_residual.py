@@ -13,18 +13,19 @@
                 or mean of |sum| > residual_sum_max + residual_sum_i |i|
 
 Divided by L, e is measured minus predicted current.  Flux and leg loss are those of the drive's data alone, so no
-estimator that follows the motor hides a fault; s are the directions of two samples ago, as in clean_voltage.  The balance over a period is exact for the voltage and takes the mean of the
-currents at both ends.  Noise of current and angle cancels in the mean, because what one sample has too much the next one
-lacks.  The sum of the currents is predicted as zero; with two sensors it is zero.
+estimator that follows the motor hides a fault; s are the directions of two samples ago, as in clean_voltage.  The
+balance over a period is exact for the voltage and takes the mean of the currents at both ends.  Noise of current and
+angle cancels in the mean, because what one sample has too much the next one lacks.  The sum of the currents is
+predicted as zero; with two sensors it is zero.
 ``motor_differs`` when ``residual_samples`` more samples were over than not; 0: never.  A sample counts if the voltage
-since the last one was known and not at its limit, where a leg that does not switch loses nothing by dead time, and if no
-current is at its rail in both; otherwise e is zero and means and counter stay.  While not
-``moved`` it is not certain what a leg loses, or a leg near its zero crossing is the mean: the means of e, sixth and power
-stay.  ``run`` = 0 sets means and counter to zero.  |x| of a vector is the larger component and half the smaller one.
+since the last one was known and not at its limit, where a leg that does not switch loses nothing by dead time, and if
+no current is at its rail in both; otherwise e is zero and means and counter stay.  While not ``moved`` it is not
+certain what a leg loses, or a leg near its zero crossing is the mean: the means of e, sixth and power stay.
+``run`` = 0 sets means and counter to zero.  |x| of a vector is the larger component and half the smaller one.
 
 Formats: fluxes S(1,30), rotated ones saturated; carried S(2,30); e S(-3,20), an eighth of the flux base in a sample,
-saturated; power U(-4,36), cut; the mean of the sum U(1,20).  Multiples of theta are saturated at 2, which no sine reaches.
-Products are rounded half up, those of the limits cut; means are cut from seven bits below.
+saturated; power U(-4,36), cut; the mean of the sum U(1,20).  Multiples of theta are saturated at 2, which no sine
+reaches.  Products are rounded half up, those of the limits cut; means are cut from seven bits below.
 """
 
 from collections import namedtuple
@@ -169,7 +170,7 @@ INPUTS = (
     S_ALPHA,
     S_BETA,
     RHO,
-    *(Port(f"sat_{x}", SAT, lo=-1, hi=1, doc=f"limit of the coming voltage, {x} axis: 1 upper, -1 lower") for x in "dq"),
+    *(Port(f"sat_{x}", SAT, lo=-1, hi=1, doc=f"limit of the coming voltage, {x} axis: 0 none") for x in "dq"),
     Port("voltage_known", BIT, doc="0: gates off or bus reading lost"),
     Port("current_at_rail", Format(0, 3, 0), doc="bit x: ADC code of phase x at either end"),
     Port("run", BIT, doc="1: the gates are switching"),

@@ -42,7 +42,8 @@ def stimuli(_rng, _config):
     """Each cause alone, cleared while present and when gone, masked; faults that come while another is present."""
     calm = dict.fromkeys((p.name for p in BLOCK.inputs), 0)
     rows = []
-    causes = ({"tripped": 1}, {"setting_refused": 1}, {"running": 1}, {"motor_differs": 1}, *({"fault_flags": 1 << k} for k in range(15)))
+    levels = ({name: 1} for name in ("tripped", "setting_refused", "running", "motor_differs"))
+    causes = (*levels, *({"fault_flags": 1 << k} for k in range(15)))
     for cause in causes:
         for clear in (31, 1, 2, 4, 8, 16, 0):
             for mask in (0, clear):
@@ -68,7 +69,7 @@ BLOCK = Block(
         Port("irq_clear", CAUSES, doc="bit x: clear cause x of irq_cause"),
     ),
     outputs=(
-        Port("irq_cause", CAUSES, doc="causes since they were cleared: trip, fault, setting refused, gates gone off, motor differs"),
+        Port("irq_cause", CAUSES, doc="causes since cleared: trip, fault, setting refused, gates off, motor differs"),
         Port("irq", BIT, doc="1: a cause that is not masked"),
     ),
     state=State(),

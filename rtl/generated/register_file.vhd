@@ -82,7 +82,7 @@ entity register_file is
     fault_flags       : in  unsigned(15 downto 0);  -- 0cc faults since the last clear_trip, see fault_latch
     first_fault       : in  unsigned(15 downto 0);  -- 0d0 faults that tripped first
     early_samples     : in  unsigned(7 downto 0);  -- 0d4 samples rejected because they came too early
-    irq_cause         : in  unsigned(4 downto 0);  -- 0d8 causes since they were cleared: trip, fault, setting refused, gates gone off, motor differs
+    irq_cause         : in  unsigned(4 downto 0);  -- 0d8 causes since cleared: trip, fault, setting refused, gates off, motor differs
     ring_recording    : in  std_logic;  -- 3e0 1: the ring records
     ring_ended        : in  std_logic;  -- 3e0 1: the ring has ended, its rows stay
     ring_full         : in  std_logic;  -- 3e0 1: every row of the ring is written

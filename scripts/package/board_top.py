@@ -122,6 +122,7 @@ BOARD = Top(
     },
     _pins(),
     LINES + axi_top.LINES,
-    frozenset({"settings", "omega_now", "speed_now", "position_restart", "forced", "trip_now", "board_stop", *axi_top.LINES_READ}),
+    frozenset({"settings", "omega_now", "speed_now", "position_restart", "forced", "trip_now", "board_stop"})
+    | axi_top.LINES_READ,
     {"core_settings": "settings_t", "core_trip": "std_logic", **axi_top.LINES_DRIVE},
 )

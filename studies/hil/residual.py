@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The residual beside the motor: healthy drives at random speeds and currents, and single faults in steady running.
 
-The plant switches with dead time and device drops; its sensors have noise.  The core has the registers of the drive file.
-A healthy motor has R, L_d, L_q and magnets 1 to 2 % off, and sensors 0.1 % apart.  A fault is there from the first
-sample, and so is steady running: time counts from there.
+The plant switches with dead time and device drops; its sensors have noise.  The core has the registers of the drive
+file.  A healthy motor has R, L_d, L_q and magnets 1 to 2 % off, and sensors 0.1 % apart.  A fault is there from the
+first sample, and so is steady running: time counts from there.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def healthy(drive: Drive, segment: int) -> Result:
 
 
 class Fault(NamedTuple):
-    """What is wrong, and where it is looked for: shares of the rated speed, or as slow as it is watched, and current."""
+    """What is wrong, and where: shares of the rated current and speed, which is at least what is watched."""
 
     name: str
     speed: float
