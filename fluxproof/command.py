@@ -27,7 +27,7 @@ class Command(NamedTuple):
 
 COMMANDS = {
     "commission": Command(
-        "fluxproof.commission.command", "measure what a drive file cannot know, over the registers of a board"
+        "fluxproof.commission_drive", "measure what a drive file cannot know, over the registers of a board"
     ),
     "constants": Command(
         "fluxproof.constants.command", "numbers of a data sheet into [machine], checked against each other"

@@ -144,6 +144,7 @@ def _incremental(drive: Drive) -> dict:
     found = {n: (v, "[encoder] counts") for n, v in turn_counter.setting(counts, drive.sensors.position_bits).items()}
     found["correct_max"] = (correct, "[encoder] counts, [machine] pole_pairs")
     found["index_once"] = (int(e.index_passes == 1), "[encoder] index_passes")
+    found["whole_lines"] = (int(e.whole_lines), "[encoder] whole_lines")
     found["index_phase"] = (e.index_phase or 0, "[encoder] index_phase")
     return found
 

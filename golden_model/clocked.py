@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The part of the core that runs at every clock, wired as in rtl/fluxproof.vhd and rtl/io/protection.vhd.
 
-Sample guard, host watch, fault latch, gates and the pin of the brake resistor.
+Sample guard, host watch, fault latch, bootstrap charge, gates and the pin of the brake resistor.
 One step is one clock; ``State`` holds the blocks' states and the registers between them.  The values of a sample come
 from fluxproof.step.  They are valid as many clocks after the clock at which the sample entered as ``DUE`` says, from
 the following step on.
@@ -13,7 +13,7 @@ from golden_model import fluxproof
 from golden_model.io import fault_latch, host_watch, sample_guard
 from golden_model.io.sample_guard import AGE_W
 from golden_model.kernel import kernel
-from golden_model.modulation import gate_generation
+from golden_model.modulation import bootstrap_charge, gate_generation
 
 INTERVAL = fluxproof.SAMPLE_INTERVAL
 # clocks after a sample entered -> its values that are valid then
@@ -29,6 +29,7 @@ class State(NamedTuple):
     of_host_watch: host_watch.State = host_watch.State()
     of_fault_latch: fault_latch.State = fault_latch.State()
     of_gate_generation: gate_generation.State = gate_generation.State()
+    of_bootstrap_charge: bootstrap_charge.State = bootstrap_charge.State()
     # Outputs that the next clock reads
     sample_busy: int = 0
     sample_early: int = 0
@@ -37,6 +38,8 @@ class State(NamedTuple):
     period: int = 0
     fault_stop: int = 0
     gate_clear: int = 0
+    gates_on: int = 0
+    charging: int = 0
 
 
 class Inputs(NamedTuple):
@@ -96,12 +99,15 @@ def step(state, inputs, regs, carrier_half):
     )  # fmt: skip
     gate_trip = 1 if x.trip or s.fault_stop or (x.sample_trip and x.enable) else 0
 
-    gate_state, (gate_high, gate_low, sample_trigger, running, tripped, setting_refused, _, _, _) = (
+    charge_state, (charging, charged) = bootstrap_charge.step(
+        s.of_bootstrap_charge, s.gates_on, s.period, r.charge_samples
+    )
+    gate_state, (gate_high, gate_low, sample_trigger, gates_on, tripped, setting_refused, _, _, _) = (
         gate_generation.step(
             s.of_gate_generation,
-            x.compare_a,
-            x.compare_b,
-            x.compare_c,
+            0 if s.charging else x.compare_a,
+            0 if s.charging else x.compare_b,
+            0 if s.charging else x.compare_c,
             x.enable,
             gate_trip,
             s.gate_clear,
@@ -116,6 +122,7 @@ def step(state, inputs, regs, carrier_half):
         of_host_watch=host_state,
         of_fault_latch=latch_state,
         of_gate_generation=gate_state,
+        of_bootstrap_charge=charge_state,
         sample_busy=sample_busy,
         sample_early=sample_early,
         sample_late=sample_late,
@@ -123,12 +130,14 @@ def step(state, inputs, regs, carrier_half):
         period=sample_trigger,
         fault_stop=fault_stop,
         gate_clear=gate_clear,
+        gates_on=gates_on,
+        charging=charging,
     )
     seen = Seen(
         gate_high=gate_high,
         gate_low=gate_low,
         sample_trigger=sample_trigger,
-        running=running,
+        running=1 if gates_on and charged else 0,
         tripped=tripped,
         fault_flags=fault_flags,
         first_fault=first_fault,

@@ -62,6 +62,7 @@ class Inverter:
     r_diode_ohm: float = not_negative("ohm", "slope of the diode", 0.0)
     zero_current_a: float = not_negative("A", "width of the zone around zero current", 0.0)
     min_on_time_s: float | None = positive("s", "shortest time that a switch is on", None)
+    bootstrap_charge_s: float = not_negative("s", "all lower switches on before the drive switches; 0: none", 0.0)
 
     @property
     def leg_pulse_s(self):
@@ -130,6 +131,9 @@ class Sensors:
     current_offset_code: tuple | None = real("codes", "at zero current, mid code if none", None, count=3)
     current_gain: tuple = trim("negative for a reversed sensor", (1.0, 1.0, 1.0), 3, signed=True)
     current_sensors: int = whole(2, 3, "3, or 2: phase a has none, its current is minus the sum of the others", 3)
+    low_side_settle_s: float | None = positive(
+        "s", "shunts in the lower legs: until one shows the current after its switch is on; none: elsewhere", None
+    )
     u_dc_offset_code: float = not_negative("codes", "at zero volts", 0.0)
     u_dc_gain: float = trim("of the bus voltage", 1.0)
     position_reverse: bool = flag("true: the code counts against the phase order", False)
@@ -171,6 +175,8 @@ class Protection:
     heartbeat_s: float = not_negative("s", "longest time without a write of the host; 0: no limit", 0.0)
     brake_on_v: float | None = positive("V", "brake resistor on from this bus voltage; none: no brake resistor", None)
     brake_off_v: float | None = positive("V", "off below this one; 97 % of brake_on_v if none", None)
+    regen_start_v: float | None = positive("V", "braking current limited from this bus voltage; none: no limit", None)
+    regen_end_v: float | None = positive("V", "no braking current from here on; midway to u_dc_max_v if none", None)
     trip_overcurrent: bool = flag("false: reported, no trip", True)
     trip_current_sum: bool = flag("false: reported, no trip; for a third current calculated from two", True)
     trip_at_rail: bool = flag("false: reported, no trip", True)

@@ -7,6 +7,7 @@ from golden_model.drive_keys import DriveError
 from golden_model.fluxproof import SAMPLE_INTERVAL
 from golden_model.formats import PU, VECTOR
 from golden_model.front_ends import check_converters, check_encoder
+from golden_model.protection_limits import default_u_dc_max_v, regen_end_v
 
 CARRIER_HALF_RANGE = (8, 32767)  # generic CARRIER_HALF of rtl/fluxproof.vhd
 ON_OF_DEAD, ON_S = 0.05, 20e-9  # shortest time that a switch is on: of the dead time, and at least
@@ -89,6 +90,26 @@ def _pulses(drive):
     if not pulse <= half:
         key = "min_pulse_s" if i.min_on_time_s is None else "dead_time_s + min_on_time_s"
         _refuse(f"[inverter] {key}", pulse, f"up to half a PWM period, {half:g} s")
+
+
+def _low_side(drive):
+    """A shunt in a lower leg shows the current only while its switch is on, and the sample is in the middle of that.
+
+    The largest duty is 1 - reserve/2, so that half of the shortest low time, reserve*T/4, lies before the sample: dead
+    time and settling must fit it.  At the peak no lower switch is on.
+    """
+    settle, period = drive.sensors.low_side_settle_s, 1.0 / drive.inverter.pwm_frequency_hz
+    if settle is None:
+        return
+    if drive.core.updates_per_period == 2:
+        _refuse("[core] updates_per_period", 2, "1 with [sensors] low_side_settle_s: no lower switch is on at the peak")
+    needed_s = settle + drive.inverter.dead_time_s + max(-drive.sampling.delay_s, 0.0)
+    least = 4.0 * needed_s / period
+    least = max(least, 4.0 * drive.sampling.delay_s / period)  # and the switch is on until then
+    if not drive.control.voltage_reserve >= least * (1.0 - WHOLE):
+        why = f"half of the low time, voltage_reserve / 4 of {period:g} s, lies before the sample"
+        keys = f"[sensors] low_side_settle_s = {settle:g} and dead_time_s = {drive.inverter.dead_time_s:g}"
+        _refuse("[control] voltage_reserve", drive.control.voltage_reserve, f"at least {least:.4g} for {keys}: {why}")
 
 
 def _samples_per_turn(drive):
@@ -225,7 +246,27 @@ def _residual(drive):
         raise DriveError("[core] residual = true needs estimators = true")
 
 
+def _regeneration(drive):
+    """As the bus rises: the chopper first, then the line that limits the braking current, the trip last."""
+    p, bus = drive.protection, drive.inverter.dc_bus_v
+    if p.regen_start_v is None:
+        if p.regen_end_v is not None:
+            raise DriveError(
+                "[protection] regen_end_v needs regen_start_v, where the limit of the braking current begins"
+            )
+        return
+    key, least = ("brake_on_v", p.brake_on_v) if p.brake_on_v is not None else ("[inverter] dc_bus_v", bus)
+    most = p.u_dc_max_v or default_u_dc_max_v(drive)
+    if not least < p.regen_start_v < most:
+        allowed = f"above {key} = {least:g} V and below u_dc_max_v = {most:g} V, which trips"
+        _refuse("[protection] regen_start_v", p.regen_start_v, allowed)
+    if not p.regen_start_v < regen_end_v(drive) < most:
+        allowed = f"above regen_start_v = {p.regen_start_v:g} V and below u_dc_max_v = {most:g} V, which trips"
+        _refuse("[protection] regen_end_v", p.regen_end_v, allowed)
+
+
 RULES = (
-    _sample_time, _sampling, _carrier, _pulses, _samples_per_turn, _voltage, _current, _flux, _codes, _speed_loop,
-    _current_loop, _flux_loop, _adaline_steps, _protection, _residual, check_encoder, check_converters,
+    _sample_time, _sampling, _carrier, _pulses, _low_side, _samples_per_turn, _voltage, _current, _flux, _codes,
+    _speed_loop, _current_loop, _flux_loop, _adaline_steps, _protection, _residual, _regeneration,
+    check_encoder, check_converters,
 )  # fmt: skip

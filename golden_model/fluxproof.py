@@ -17,6 +17,7 @@ from golden_model.control import (
     current_reference,
     dead_time_compensation,
     decoupling,
+    regeneration_limit,
     speed_pi,
     torque_reference,
     voltage_limit,
@@ -61,7 +62,7 @@ from golden_model.io import (
     u_dc_processing,
 )
 from golden_model.kernel import kernel
-from golden_model.modulation import gate_generation, pwm_compare, svm, svm_delay_compensation
+from golden_model.modulation import bootstrap_charge, gate_generation, pwm_compare, svm, svm_delay_compensation
 from golden_model.transforms import clarke, flux_inverse_park, flux_park, inverse_park, park, sincos
 
 # Instance of the top -> (its block, the instances it waits for).  A block starts when the last of them is done.
@@ -79,8 +80,9 @@ WIRING = {
     "current_circle": (current_limit, ("latch",)),
     "table_current": (current_reference, ("current_circle",)),
     "speed_regulator": (speed_pi, ("speed_measurement", "current_circle")),
+    "regeneration": (regeneration_limit, ("speed_regulator", "bus_voltage")),
     "references": (torque_reference, ("speed_regulator", "bus_voltage")),
-    "current_regulators": (current_pi, ("rotor_frame", "speed_regulator", "current_circle")),
+    "current_regulators": (current_pi, ("rotor_frame", "regeneration", "current_circle")),
     "resistance": (winding_resistance, ("latch",)),
     "merged_flux": (flux_park, ("trig",)),
     "models": (flux_models, ("rotor_frame", "merged_flux", "resistance")),
@@ -110,7 +112,7 @@ WIRING = {
     "residual": (motor_residual, ("models",)),
     "checks": (sample_checks, ("conditioning", "bus_voltage")),
     "zero_check": (offset_check, ("conditioning", "speed_measurement")),
-    "motion": (motion_checks, ("speed_regulator",)),
+    "motion": (motion_checks, ("regeneration",)),
     "emf": (emf_check, ("circle",)),
     "load": (load_check, ("motion", "conditioning", "angle")),
     "chopper": (brake_chopper, ("bus_voltage",)),
@@ -129,7 +131,7 @@ EARLY = {
     ("rotor_frame", "trig"): sincos.SECOND,
     ("merged_flux", "trig"): sincos.SECOND,
     ("current_regulators", "rotor_frame"): 1,
-    ("current_regulators", "speed_regulator"): 1,
+    ("current_regulators", "regeneration"): 1,
     ("models", "rotor_frame"): 1,
     ("models", "merged_flux"): 2,
     ("circle", "current_regulators"): 1,
@@ -137,7 +139,13 @@ EARLY = {
     ("stator_voltage", "circle"): 1,
 }
 
-AT_THE_CLOCK = (sample_guard, host_watch, fault_latch, gate_generation)  # wired in golden_model/clocked.py
+AT_THE_CLOCK = (
+    sample_guard,
+    host_watch,
+    fault_latch,
+    bootstrap_charge,
+    gate_generation,
+)  # wired in golden_model/clocked.py
 MODULES = (*dict.fromkeys(module for module, _ in WIRING.values()), *AT_THE_CLOCK)
 
 
@@ -150,8 +158,12 @@ def schedule() -> dict[str, tuple[int, int]]:
     return times
 
 
-# Two Park transforms whose outputs the top renames; the others' outputs already have the names of their use.
-RENAMED = {"compensation_dq": ("u_comp_d", "u_comp_q"), "direction_functions": ("d_d", "d_q")}
+# Blocks whose outputs the top renames; the others' outputs already have the names of their use.
+RENAMED = {
+    "speed_regulator": ("torque_ref", "speed_limited"),
+    "compensation_dq": ("u_comp_d", "u_comp_q"),
+    "direction_functions": ("d_d", "d_q"),
+}
 
 
 def outputs_of(instance: str) -> tuple[str, ...]:
@@ -247,6 +259,8 @@ class State(NamedTuple):
     torque_max: int = 0
     of_current_reference: current_reference.State = current_reference.State()
     of_torque_reference: torque_reference.State = torque_reference.State()
+    regen_limited: int = 0
+    of_regeneration_limit: regeneration_limit.State = regeneration_limit.State()
     of_motor_residual: motor_residual.State = motor_residual.State()
 
 
@@ -267,6 +281,7 @@ class Observed(NamedTuple):
     i_q: int
     i_q_ref: int
     speed_limited: int
+    regen_limited: int
     lambda_d: int
     lambda_q: int
     omega_chord: int
@@ -399,15 +414,19 @@ def step_table(state, sample, regs, config, of_speed, table):
     i_d_asked = state.i_d_table if by_table else x.i_d_ref
     current_limit_state, (i_d_limited, i_q_max) = current_limit.step(state.of_current_limit, i_d_asked, r.i_max)
     most = state.torque_max if by_table else i_q_max
-    speed_pi_state, (i_q_ref, speed_limited) = speed_pi.step(
-        state.of_speed_pi, x.omega_ref, omega_me, x.i_q_ext, most, x.speed_mode, x.run, r.speed_kp, r.speed_ki
-    )
-    torque_ref, table_current_state = i_q_ref, state.of_current_reference
+    speed_pi_state, (torque_ref, speed_limited) = speed_pi.step(
+        state.of_speed_pi, x.omega_ref, omega_me, x.i_q_ext, most, state.regen_limited, x.speed_mode, x.run,
+        r.speed_kp, r.speed_ki,
+    )  # fmt: skip
+    i_q_asked, table_current_state = torque_ref, state.of_current_reference
     if c.references:
         table_current_state, (i_q_circle,) = current_reference.step(
             state.of_current_reference, state.i_q_table, i_q_max, r.use_table
         )
-        i_q_ref = i_q_circle if by_table else i_q_ref
+        i_q_asked = i_q_circle if by_table else torque_ref
+    regeneration_state, (i_q_ref, regen_limited) = regeneration_limit.step(
+        state.of_regeneration_limit, i_q_asked, omega_me, u_dc, r.i_max, r.regen_start, r.regen_slope
+    )
     current_pi_state, (u_pi_d, u_pi_q, u_int_d, u_int_q) = current_pi.step(
         state.of_current_pi, i_d, i_q, i_d_limited, i_q_ref, state.sat_d, state.sat_q, x.run, r.kp_d, r.ki_d, r.kp_q,
         r.ki_q,
@@ -469,8 +488,8 @@ def step_table(state, sample, regs, config, of_speed, table):
         state.of_offset_check, i_a, i_b, i_c, omega_me, x.run, r.omega_stall, r.offset_max
     )
     motion_checks_state, (motion_faults,) = motion_checks.step(
-        state.of_motion_checks, omega_me, x.omega_ref, x.speed_mode, speed_limited, x.run, r.omega_trip, r.omega_away,
-        r.runaway_samples, r.omega_stall, r.stall_samples,
+        state.of_motion_checks, omega_me, x.omega_ref, x.speed_mode, speed_limited, regen_limited, x.run, r.omega_trip,
+        r.omega_away, r.runaway_samples, r.omega_stall, r.stall_samples,
     )  # fmt: skip
     emf_check_state, (encoder_lost,) = emf_check.step(
         state.of_emf_check,
@@ -501,13 +520,15 @@ def step_table(state, sample, regs, config, of_speed, table):
         lambda_add_d=after.lambda_add_d, lambda_add_q=after.lambda_add_q, v_comp=after.v_comp, v_leg=after.v_leg,
         s_alpha=after.s_alpha, s_beta=after.s_beta, of_current_reference=table_current_state,
         of_torque_reference=references_state, i_d_table=i_d_table, i_q_table=i_q_table, torque_max=torque_max,
+        regen_limited=regen_limited, of_regeneration_limit=regeneration_state,
         of_motor_residual=after.of_motor_residual,
     )  # fmt: skip
     return following, Observed(
         i_a=i_a, i_b=i_b, i_c=i_c, current_at_rail=current_at_rail, u_dc=u_dc, u_max=u_max, u_dc_at_rail=u_dc_at_rail,
         u_dc_low=u_dc_low, theta_me=theta_me, omega_me=omega_me, i_d=i_d, i_q=i_q, i_q_ref=i_q_ref,
-        speed_limited=speed_limited, lambda_d=lambda_d, lambda_q=lambda_q, omega_chord=omega_chord, u_dec_d=u_dec_d,
-        u_dec_q=u_dec_q, u_comp_d=e.u_comp_d, u_comp_q=e.u_comp_q, u_int_d=u_int_d, u_int_q=u_int_q, u_d=u_d, u_q=u_q,
+        speed_limited=speed_limited, regen_limited=regen_limited, lambda_d=lambda_d, lambda_q=lambda_q,
+        omega_chord=omega_chord, u_dec_d=u_dec_d, u_dec_q=u_dec_q, u_comp_d=e.u_comp_d, u_comp_q=e.u_comp_q,
+        u_int_d=u_int_d, u_int_q=u_int_q, u_d=u_d, u_q=u_q,
         sat_d=sat_d, sat_q=sat_q, u_alpha=u_alpha, u_beta=u_beta, duty_a=duty_a, duty_b=duty_b, duty_c=duty_c,
         u_applied_alpha=e.u_applied_alpha, u_applied_beta=e.u_applied_beta, lambda_c_d=e.lambda_c_d,
         lambda_c_q=e.lambda_c_q, lambda_m_alpha=e.lambda_m_alpha, lambda_m_beta=e.lambda_m_beta,

@@ -11,7 +11,7 @@ from golden_model.drive_keys import DriveError, choice, flag, not_negative, posi
 # kind -> (keys it needs, keys it may have besides)
 ENCODERS = {
     "code": ((), ()),
-    "abz": (("counts",), ("filter_s", "index_phase", "index_passes")),
+    "abz": (("counts",), ("filter_s", "index_phase", "index_passes", "whole_lines")),
     "hall": ((), ("filter_s",)),
     "ssi": (("bits", "clock_hz"), ("turns_bits", "crc", "gray", "pause_s", "bridge_samples")),
     "biss": (("bits", "clock_hz"), ("turns_bits", "crc", "start_s", "pause_s", "bridge_samples")),
@@ -54,6 +54,7 @@ class Encoder:
     index_passes: int = whole(
         1, 2, "abz: passes of the index until it is believed; 1 where the shaft cannot turn on", 2
     )
+    whole_lines: bool = flag("abz: speed over whole lines of four counts, for a disc whose counts are uneven", False)
     index_phase: int | None = whole(0, 3, "abz: quarter of a line in which Z counts; A, B = 00, 10, 11, 01", None)
 
 

@@ -55,7 +55,7 @@ def protection(drive):
     yield Entry("rail_samples", p.rail_samples, "1", 1.0, "[protection] rail_samples")
     keys = "[inverter] dc_bus_v"
     yield _limit("u_dc_min", p.u_dc_min_v, BUS_LOW * bus, "V", b.voltage_v, "u_dc_min_v", keys, volts)
-    most = max(bus, min(BUS_HIGH * bus, TRIP_OF_RANGE * s.u_dc_range_v))
+    most = default_u_dc_max_v(drive)
     yield _limit("u_dc_max", p.u_dc_max_v, most, "V", b.voltage_v, "u_dc_max_v", keys, volts)
     finest, keys = 2.0**s.position_bits, "[sensors] position_bits"
     if drive.encoder.counts is not None:
@@ -73,6 +73,7 @@ def protection(drive):
     yield from emf_limits(drive)
     yield from residual_limits(drive)
     yield from brake_limits(drive)
+    yield from regeneration_line(drive)
 
 
 def emf_limits(drive):
@@ -170,6 +171,28 @@ def brake_limits(drive):
     off, key = (BRAKE_HYSTERESIS * on, "brake_on_v") if off is None else (off, "brake_off_v")
     yield Entry("brake_on", on, "V", b.voltage_v, f"[protection] brake_on_v; {volts}")
     yield Entry("brake_off", off, "V", b.voltage_v, f"[protection] {key}; {volts}")
+
+
+def regeneration_line(drive):
+    """The braking current falls from the current limit at regen_start_v to none at regen_end_v; slope 0: no limit."""
+    p, b = drive.protection, drive.bases
+    volts, per_volt = base_keys(drive, "voltage_v"), b.current_a / b.voltage_v
+    slope = 0.0 if p.regen_start_v is None else drive.current_limit_a / (regen_end_v(drive) - p.regen_start_v)
+    yield Entry("regen_start", p.regen_start_v or 0.0, "V", b.voltage_v, f"[protection] regen_start_v; {volts}")
+    keys = f"[protection] regen_start_v, regen_end_v; {base_keys(drive, 'current_a', 'voltage_v')}"
+    yield Entry("regen_slope", slope, "A/V", per_volt, keys)
+
+
+def default_u_dc_max_v(drive):
+    """The bus voltage that trips u_dc_high where u_dc_max_v does not give it [V]."""
+    bus = drive.inverter.dc_bus_v
+    return max(bus, min(BUS_HIGH * bus, TRIP_OF_RANGE * drive.sensors.u_dc_range_v))
+
+
+def regen_end_v(drive):
+    """The bus voltage that leaves no braking current, of a drive with regen_start_v [V]."""
+    p = drive.protection
+    return p.regen_end_v or (p.regen_start_v + (p.u_dc_max_v or default_u_dc_max_v(drive))) / 2.0
 
 
 def _limit(name, given, default, unit, base, key, default_keys, base_names):

@@ -40,7 +40,7 @@ AHEAD_SAMPLES = 2.5  # from a sample to the middle of the next sample's voltage
 THRESHOLD_OF_BASE = 2e-5  # of the voltage base: five of the format's steps
 LOSS_MARGIN, LOSS_SPARE_V = (3.0, 3.0)  # largest compensation: factor on the leg loss by data sheet, device drops
 PSI_STEP, PSI_FROM = (0.01, 0.1)  # 2*eta*omega**2 at rated speed; part of rated speed from which psi_m is estimated
-ROUND_UP = ("dead_time", "min_pulse")  # times that must not be shorter than specified
+ROUND_UP = ("dead_time", "min_pulse", "charge_samples")  # times that must not be shorter than specified
 
 
 def sensing(drive):
@@ -246,6 +246,8 @@ def gates(drive):
     keys = "min_pulse_s" if i.min_on_time_s is None else "min_on_time_s, dead_time_s"
     yield Entry("dead_time", i.dead_time_s, "s", clock_s, "[inverter] dead_time_s; [core] clock_hz")
     yield Entry("min_pulse", i.leg_pulse_s, "s", clock_s, f"[inverter] {keys}; [core] clock_hz")
+    keys = "[inverter] bootstrap_charge_s, pwm_frequency_hz"
+    yield Entry("charge_samples", i.bootstrap_charge_s, "s", drive.sample_time_s, keys)
     yield Entry("double_update", drive.core.updates_per_period - 1, "1", 1.0, "[core] updates_per_period")
 
 

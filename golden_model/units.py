@@ -43,6 +43,7 @@ ONE_IS = {
     "ohm/K": "U_base/I_base/K",
     "H": "U_base/omega_base/I_base",
     "V/A": "U_base/I_base",
+    "A/V": "I_base/U_base",
     "V/(A s)": "U_base/I_base/T_s",
     "1/Wb": "omega_base/U_base",
     "Nm s/rad": "1.5*pole_pairs*I_base*U_base/omega_base/omega_base",
@@ -61,7 +62,9 @@ _ONE_OF_REGISTER = {
     "k_delay": "2*pi/omega_base",
     "omega_0": "1/T_s",
     **dict.fromkeys(("dead_time", "min_pulse", "watchdog"), "1/clock_hz"),
-    **dict.fromkeys(("runaway_samples", "stall_samples", "emf_samples", "residual_samples", "heartbeat"), "T_s"),
+    **dict.fromkeys(
+        ("runaway_samples", "stall_samples", "emf_samples", "residual_samples", "heartbeat", "charge_samples"), "T_s"
+    ),
 }
 
 

@@ -77,6 +77,7 @@ architecture rtl of fluxproof is
   signal sample_entered, latch_valid, current_soon    : std_logic;
   signal current_valid, theta_valid, omega_valid      : std_logic;
   signal dc_valid, circle_valid, reference_valid      : std_logic;
+  signal i_q_valid                                    : std_logic;
   signal dc_soon, alpha_beta_soon, dq_soon            : std_logic;
   signal trig_soon, trig_valid                        : std_logic;
   signal models_valid, lambda_valid, decoupling_valid : std_logic;
@@ -86,6 +87,7 @@ architecture rtl of fluxproof is
   -- Values between the blocks of the control
   signal inverse, inverse_beta                  : unsigned(U_DC_PROCESSING_INVERSE_W - 1 downto 0);
   signal i_alpha, i_beta, i_d_limited, i_q_max  : signed(PU_W - 1 downto 0);
+  signal i_q_asked                              : signed(PU_W - 1 downto 0);
   signal theta_out                              : unsigned(TURN_W - 1 downto 0);
   signal cos_theta, sin_theta, cos_out, sin_out : signed(PU_W - 1 downto 0);
   signal u_pi_d, u_pi_q                         : signed(PU_W - 1 downto 0);
@@ -103,6 +105,8 @@ architecture rtl of fluxproof is
 
   -- Protection
   signal guard_busy, gate_trip, gate_clear, period : std_logic;
+  signal gates_on, charging, charged               : std_logic;
+  signal compare_a, compare_b, compare_c           : unsigned(15 downto 0);
 
   signal o : observed_t;
   signal e : estimated_t;
@@ -199,7 +203,7 @@ begin
   speed_regulator : entity work.speed_pi
     port map (clk => clk, rst => rst, in_valid => omega_valid,
               omega_ref => omega_ref, omega_me => o.omega_me, i_q_ext => i_q_ext, i_q_max => torque_limit,
-              speed_mode => speed_mode, run => run,
+              regen_limited => o.regen_limited, speed_mode => speed_mode, run => run,
               speed_kp => settings.speed_kp, speed_ki => settings.speed_ki,
               out_valid => reference_valid, i_q_ref => torque_ref, speed_limited => o.speed_limited);
 
@@ -223,12 +227,18 @@ begin
 
     i_d_asked    <= i_d_table when settings.use_table = '1' else i_d_ref;
     torque_limit <= torque_max when settings.use_table = '1' else i_q_max;
-    o.i_q_ref    <= i_q_circle when settings.use_table = '1' else torque_ref;
+    i_q_asked    <= i_q_circle when settings.use_table = '1' else torque_ref;
   else generate
     i_d_asked    <= i_d_ref;
     torque_limit <= i_q_max;
-    o.i_q_ref    <= torque_ref;
+    i_q_asked    <= torque_ref;
   end generate by_table;
+
+  regeneration : entity work.regeneration_limit
+    port map (clk => clk, rst => rst, in_valid => reference_valid,
+              i_q_asked => i_q_asked, omega_me => o.omega_me, u_dc => o.u_dc,
+              i_max => settings.i_max, regen_start => settings.regen_start, regen_slope => settings.regen_slope,
+              out_valid => i_q_valid, i_q_ref => o.i_q_ref, regen_limited => o.regen_limited);
 
   current_regulators : entity work.current_pi
     port map (clk => clk, rst => rst, in_valid => dq_soon,
@@ -477,12 +487,12 @@ begin
   safety : entity work.protection
     generic map (POSITION_BITS => POSITION_BITS)
     port map (clk => clk, rst => rst, sample_valid => sample_valid, current_valid => current_valid,
-              dc_valid => dc_valid, omega_valid => omega_valid, reference_valid => reference_valid,
+              dc_valid => dc_valid, omega_valid => omega_valid, i_q_valid => i_q_valid,
               voltage_valid => dq_voltage_valid,
               i_a => o.i_a, i_b => o.i_b, i_c => o.i_c, current_at_rail => o.current_at_rail, u_dc => o.u_dc,
               u_dc_at_rail => o.u_dc_at_rail, code_theta => code_theta, theta_me => o.theta_me, omega_me => o.omega_me,
               omega_ref => omega_ref, speed_mode => speed_mode, i_q_ref => o.i_q_ref, speed_limited => o.speed_limited,
-              u_d => o.u_d, u_q => o.u_q, u_comp_d => e.u_comp_d, u_comp_q => e.u_comp_q, i_d => o.i_d, i_q => o.i_q,
+              regen_limited => o.regen_limited, u_d => o.u_d, u_q => o.u_q, u_comp_d => e.u_comp_d, u_comp_q => e.u_comp_q, i_d => o.i_d, i_q => o.i_q,
               model_d => model_d, model_q => model_q,
               run => run, trip => trip, enable => enable, clear_trip => clear_trip, host_write => host_write,
               period => period, settings => settings, sample_busy => guard_busy, early_samples => early_samples,
@@ -491,13 +501,24 @@ begin
               fault_flags => fault_flags, first_fault => first_fault, gate_trip => gate_trip, gate_clear => gate_clear,
               brake => brake);
 
+  charge : entity work.bootstrap_charge
+    port map (clk => clk, rst => rst,
+              gates_on => gates_on, period => period,
+              charge_samples => settings.charge_samples,
+              charging => charging, charged => charged);
+
+  compare_a <= o.compare_a and not charging;
+  compare_b <= o.compare_b and not charging;
+  compare_c <= o.compare_c and not charging;
+  running   <= gates_on and charged;
+
   gates : entity work.gate_generation
     generic map (CARRIER_HALF => CARRIER_HALF)
     port map (clk => clk, rst => rst,
-              compare_a => o.compare_a, compare_b => o.compare_b, compare_c => o.compare_c, enable => enable,
+              compare_a => compare_a, compare_b => compare_b, compare_c => compare_c, enable => enable,
               trip => gate_trip, clear_trip => gate_clear,
               dead_time => settings.dead_time, min_pulse => settings.min_pulse, double_update => settings.double_update,
-              gate_high => gate_high, gate_low => gate_low, sample => period, running => running,
+              gate_high => gate_high, gate_low => gate_low, sample => period, running => gates_on,
               tripped => tripped, setting_refused => setting_refused, min_pulse_used => min_pulse_used,
               double_used => double_used, carrier => carrier);
 

@@ -12,9 +12,9 @@ import pytest
 
 from cocotb_tests.support.slow import halved
 from fluxproof import command
+from fluxproof import commission_drive as commissioning
 from fluxproof.checkout import DRIVES
 from fluxproof.commission import alignment, current_scale, wiring
-from fluxproof.commission import command as commissioning
 from fluxproof.commission import session as session_parts
 from fluxproof.commission.bus import CODES, VALUES, WINDOW, BusError, UioBus
 from fluxproof.commission.session import Refusal, Session

@@ -112,6 +112,38 @@ def test_without_estimators(tmp_path):
     assert not any(arrays[f"observed_{name}"].any() for name in Estimated._fields)
 
 
+@pytest.mark.slow
+def test_braking_that_the_bus_limits(tmp_path):
+    """The line of [protection] regen_start_v in RTL: met, down to no braking current, and left again."""
+    skip_without_ghdl5()
+    path = tmp_path / "regen.toml"
+    path.write_text(f"{PAPER.read_text()}\n[protection]\nregen_start_v = 580\nregen_end_v = 640\n")
+    summary, arrays, _ = close_loop(InVerilator, path, "braking", 100, key=" regen")
+    limited = arrays["observed_regen_limited"] == 1
+    assert summary["differences"] == 0 and summary["periods_compared"] == 300
+    assert limited.sum() > 60 and (arrays["observed_i_q_ref"] == 0)[limited].any()
+    assert len(np.unique(arrays["observed_i_q_ref"][limited])) > 5, "a line, not a switch"
+
+
+@pytest.mark.slow
+def test_bootstraps_are_charged_before_the_drive_switches(tmp_path):
+    """[inverter] bootstrap_charge_s of four periods: the lower gates alone after enable, and after a stop."""
+    skip_without_ghdl5()
+    path = tmp_path / "charge.toml"
+    path.write_text(PAPER.read_text().replace("[inverter]\n", "[inverter]\nbootstrap_charge_s = 3.5e-4\n"))
+    summary, arrays, register_set = close_loop(InVerilator, path, "compressed", 100, key=" charge")
+    assert register_set.values.charge_samples == 4
+    assert summary["differences"] == 0 and summary["periods_compared"] == 500
+    edges = arrays["gate_edges"]
+    words = [0, *edges[:, 2]]
+    starts = [k for k in range(len(edges)) if words[k] == 0 and words[k + 1] == 0b111000]
+    charges = [k for k in starts if np.ptp(edges[k : k + 2, 0]) >= 3]  # nothing but the lower gates for three periods
+    assert len(charges) == 2, "after enable and after the stop of the scenario"
+    for k in charges:
+        lasted = (edges[k + 1, 0] - edges[k, 0]) * 200 + edges[k + 1, 1] - edges[k, 1]
+        assert 4 * 200 - register_set.values.dead_time <= lasted < 5 * 200
+
+
 def test_timeline():
     """Every block starts when its last input is valid and has its declared latency, measured in the RTL."""
     measured = timeline.measure()

@@ -95,6 +95,13 @@ WRONG = {  # section, line, what the message must contain besides the file's nam
         "at least 1e-07 s",
     ),
     "two pulses": ("inverter", "min_on_time_s = 1e-6", "min_on_time_s and min_pulse_s are both given"),
+    "low side": (
+        "sensors",
+        "low_side_settle_s = 2e-6",
+        "[control] voltage_reserve = 0 is out of range: allowed is at least 0.16",
+        "low_side_settle_s = 2e-06 and dead_time_s = 2e-06",
+        "before the sample",
+    ),
     "min pulse": ("inverter", "min_pulse_s = 60e-6", "[inverter] min_pulse_s", "5e-05 s"),
     "bus": ("inverter", "dc_bus_v = 900", "[inverter] dc_bus_v = 900", "sqrt(3)", "866.025 V"),
     "bus range": ("inverter", "dc_bus_v = 1100", "[inverter] dc_bus_v = 1100", "u_dc_range_v = 1000 V"),
@@ -321,3 +328,21 @@ def test_command_exits_quietly_on_a_closed_pipe():
         process.stdout.close()
         assert process.stderr.read() == b""
         assert process.wait() == 0
+
+
+def test_shunts_in_the_lower_legs_have_a_reserve_and_one_update():
+    """The smallest allowed reserve is accepted, one below is not; the sample at the peak would see no current."""
+    drive = load(PAPER)
+    sensors = dataclasses.replace(drive.sensors, low_side_settle_s=2e-6)
+
+    def described(reserve, **core):
+        control = dataclasses.replace(drive.control, voltage_reserve=reserve, sample_time_s=None)
+        return dataclasses.replace(
+            drive, sensors=sensors, control=control, core=dataclasses.replace(drive.core, **core)
+        )
+
+    assert described(0.16).sensors.low_side_settle_s == 2e-6  # 4*(2 us + 2 us)/100 us
+    with pytest.raises(DriveError, match="at least 0.16 for"):
+        described(0.159)
+    with pytest.raises(DriveError, match="no lower switch is on at the peak"):
+        described(0.5, updates_per_period=2)

@@ -6,6 +6,7 @@ The same values go through the VHDL and the converted RTL in the tours of faults
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -13,15 +14,19 @@ import pytest
 
 from cocotb_tests.support.core.limits import DRIVE, QUARTER, SET, first, play, told
 from cocotb_tests.support.slow import slowly
-from fluxproof.checkout import ROOT
+from fluxproof.checkout import DRIVES, ROOT
 from fluxproof.cosim.golden_clock import GoldenClock
-from fluxproof.cosim.scenarios import RPM
+from fluxproof.cosim.golden_loop import simulate
+from fluxproof.cosim.scenarios import RPM, scenario
+from fluxproof.simulate.run import bus_of
 from golden_model import drive as drives
 from golden_model.control import current_limit
 from golden_model.io.fault_latch import NAMES
 from golden_model.io.sample_checks import IGNORE
+from golden_model.protection_limits import regen_end_v
+from golden_model.registers import registers
 from golden_model.scaling import PARTS
-from golden_model.units import from_si, one_is
+from golden_model.units import from_si, one_is, to_si
 
 
 @pytest.mark.parametrize("rpm, turned", [
@@ -209,3 +214,43 @@ def test_units_of_the_registers_are_the_scales():
         assert eval(says, {"__builtins__": {}}, known) == pytest.approx(entry.scale, rel=1e-12), entry.name  # noqa: S307
         checked += 1
     assert checked > 60 and one_is("torque", "Nm") == "1.5*pole_pairs*I_base*U_base/omega_base"
+
+
+def braked(seconds, to_rpm, friction_nm, **protection):
+    """(drive, result) of the servo, without a brake resistor on 1 mF behind a diode, from 2,400 rpm to ``to_rpm``."""
+    drive = drives.load(DRIVES / "servo_24v.toml")
+    machine = dataclasses.replace(drive.machine, coulomb_friction_nm=friction_nm, viscous_friction_nms=0.0)
+    protection = dataclasses.replace(drive.protection, brake_on_v=None, **protection)
+    drive = dataclasses.replace(drive, machine=machine, protection=protection)
+    moves = scenario(drive, seconds, rpm={0.0: 2400, 0.01: to_rpm}, start_rpm=2400)
+    return drive, simulate(drive, registers(drive), moves, bus=bus_of(drive))
+
+
+def named(result):
+    """Names of the faults of samples and of motion in a run."""
+    bits = np.bitwise_or.reduce(result.observed["sample_faults"])
+    motion = np.bitwise_or.reduce(result.observed["motion_faults"])
+    return [name for k, name in enumerate(NAMES) if bits >> k & 1] + [f"motion {motion}"] * bool(motion)
+
+
+def test_the_bus_limits_the_braking_current():
+    """A reversal that trips by u_dc_high: with the line the bus ends at it, and a coasting shaft is no runaway."""
+    drive, result = braked(0.06, -2400, 0.0)
+    assert named(result) == ["u_dc_high"]
+    drive, result = braked(0.1, -2400, 0.0, regen_start_v=27.0)
+    o, volts = result.observed, result.plant["u_dc"]
+    assert named(result) == [] and 28.5 < volts.max() < regen_end_v(drive) + 0.1
+    limited = o["regen_limited"] == 1
+    assert limited.sum() * drive.sample_time_s > 0.08, "the bus stays full: no friction, the shaft coasts"
+    assert (o["i_q_ref"] * o["omega_me"] <= 0)[limited].all()
+    after = np.flatnonzero(limited)[0] + 100  # the line itself, in steady state
+    most = drive.current_limit_a * np.clip((regen_end_v(drive) - volts) / (regen_end_v(drive) - 27.0), 0.0, 1.0)
+    assert np.abs(np.abs(to_si("i_q_ref", o["i_q_ref"], drive)) - most)[after:][limited[after:]].max() < 0.1
+
+
+def test_a_stop_on_a_full_bus_does_not_overshoot():
+    """The speed regulator integrates no braking that the bus does not allow: the shaft does not run backwards."""
+    drive, result = braked(0.36, 0, 0.02, regen_start_v=26.0, regen_end_v=27.0)
+    rpm = result.plant["omega_m"] / RPM
+    assert named(result) == [] and (result.observed["regen_limited"] == 1).sum() > 2000
+    assert np.abs(rpm[-200:]).max() < 15.0 and rpm.min() > -15.0, "15 rpm: a twentieth of a count in a sample"

@@ -140,6 +140,20 @@ def test_a_reversal_behind_a_diode_trips_and_says_what_it_needs(name):
     assert weak["status"] == "tripped" and "u_dc_high" in weak["reason"]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name, start, most, lasts", [("servo_24v", 27.0, 29.2, 0.88), ("spindle_400v", 600.0, 651.5, 11.3)]
+)
+def test_a_reversal_limited_by_the_bus_does_not_trip(name, start, most, lasts):
+    """docs/faults.md: no resistor, 1 mF behind a diode, the braking current on its line; the shaft coasts to rest."""
+    drive = fed(name)
+    protection = dataclasses.replace(drive.protection, regen_start_v=start)
+    data, _ = simulate(dataclasses.replace(drive, protection=protection), name)
+    found = data["figures"]["Supply"]
+    assert data["status"] == "ok" and start < found["bus_voltage_highest"]["value"] < most
+    assert found["braking_limited_by_the_bus"]["value"] == pytest.approx(lasts, rel=0.02)
+
+
 def test_a_battery_takes_back_what_braking_gives():
     data, _ = simulate(fed("servo_24v", source="battery"), "servo")
     found = data["figures"]["Supply"]

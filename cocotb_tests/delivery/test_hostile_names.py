@@ -17,8 +17,8 @@ from cocotb_tests.support.diagnoses.samples import made_up
 from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.untrusted.foreign_text import NAMES, Page, c_tokens, unescaped, vhdl_analysed
 from cocotb_tests.support.vivado.tclsh import needs_tclsh, stubbed
+from fluxproof import commission_drive as commissioning
 from fluxproof.command import main
-from fluxproof.commission import command as commissioning
 from fluxproof.commission import steps
 from fluxproof.commission.session import Step, Value
 from fluxproof.diagnosis.conventions.reading import Reading

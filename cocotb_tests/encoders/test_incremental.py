@@ -21,8 +21,19 @@ SAMPLE = 1000  # clocks
 CLOCK_HZ, POLE_PAIRS, OMEGA_BASE = 100e6, 4, 2 * np.pi * 4 * 100.0
 
 
+# Speeds that single counts read, smallest and largest, then those over whole lines [rpm]
+EXTREMES = {1700.0: (1013.2, 5278.7, 1700.0, 1700.1), 3000.0: (2447.2, 3876.1, 2999.8, 3000.2)}
+
+
 def player(counts: int, **registers: int) -> GoldenPlayer:
-    regs = {"filter_clocks": FILTER, "index_phase": 0, "correct_max": 40, "reverse": 0, "index_once": 1}
+    regs = {
+        "filter_clocks": FILTER,
+        "index_phase": 0,
+        "correct_max": 40,
+        "reverse": 0,
+        "index_once": 1,
+        "whole_lines": 0,
+    }
     regs |= turn_counter.setting(counts, BITS)
     regs["k_edge"] = edge_timer.setting(counts, POLE_PAIRS, CLOCK_HZ, OMEGA_BASE)
     return GoldenPlayer(incremental_encoder.BLOCK, {"POSITION_BITS": BITS}, regs | registers)
@@ -230,6 +241,55 @@ def test_speed_falls_to_zero_after_a_stop_and_trembling_has_none():
     out = device.play({**Incremental(counts).pins(tremble, rng), "sample": sampled(len(tremble))})
     omega = out["omega_me"][np.flatnonzero(out["omega_valid"])][3:]
     assert len(np.unique(out["count"])) == 2 and np.abs(omega).max() == 0
+
+
+def uneven_speeds(rpm: float, phase: float, duty: float, clocks: int) -> tuple[np.ndarray, np.ndarray]:
+    """Speeds [rpm] of 1,024 uneven counts at 20 kHz, by single counts and over whole lines."""
+    counts, rng, every, read = 1024, np.random.default_rng(7), 5000, []
+    path = 0.5 + np.cumsum(np.full(clocks, rpm / 60 * counts / CLOCK_HZ))
+    pins = Incremental(counts, phase_error=phase, duty_error=duty).pins(path, rng)
+    for lines in (0, 1):
+        out = player(counts, whole_lines=lines).play({**pins, "sample": sampled(clocks, every)})
+        speed = out["omega_me"][np.flatnonzero(out["omega_valid"])][6:]
+        read.append(speed / 2**16 * OMEGA_BASE / POLE_PAIRS * 30 / np.pi)
+    return read[0], read[1]
+
+
+@pytest.mark.parametrize("rpm", [1700.0, -3000.0])
+@pytest.mark.parametrize("phase, duty", [(25 / 90, 0.4), (-25 / 90, 0.4)])
+def test_uneven_counts_do_not_tremble_over_whole_lines(rpm, phase, duty):
+    """A and B 90 +- 25 degrees apart, levels of 60 % of a line: single counts tremble, whole lines do not."""
+    single, whole = uneven_speeds(rpm, phase, duty, 150_000)
+    assert np.abs(whole / rpm - 1.0).max() < 2e-4 and (single / rpm).max() > 1.2
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("rpm", [1700.0, 3000.0])
+def test_extremes_of_uneven_counts(rpm, figure):
+    """docs/board.md: the largest and smallest speed that single counts and whole lines read."""
+    pairs = [uneven_speeds(rpm, p / 90, d, 2_000_000) for p in (25, -25) for d in (0.4, -0.4)]
+    low, high, least, most = (
+        round(f(np.concatenate(p)), 1) for p in zip(*pairs, strict=True) for f in (np.min, np.max)
+    )
+    figure(f"speed read at {rpm:g} rpm over whole lines of uneven counts", most, rpm, "rpm", most - least < 1.0)
+    assert high > 1.2 * 3000.0 and low < 0.9 * rpm and abs(most / rpm - 1.0) < 2e-4 and abs(least / rpm - 1.0) < 2e-4
+    assert (low, high, least, most) == (pytest.approx(EXTREMES[rpm], abs=0.1))
+
+
+def test_over_whole_lines_a_reversal_begins_a_new_line():
+    """No speed from the reversal on until a line is passed, then the true one; over an edge to and fro none at all."""
+    counts, rng, every = 4000, np.random.default_rng(8), 400
+    steps = np.concatenate([np.full(20_000, 0.007), np.full(20_000, -0.007), 0.03 * np.sin(np.arange(40_000) / 40)])
+    path = 0.5 + np.cumsum(steps)
+    out = player(counts, whole_lines=1).play(
+        {**Incremental(counts).pins(path, rng), "sample": sampled(len(path), every)}
+    )
+    at = np.flatnonzero(out["omega_valid"])
+    omega, true = out["omega_me"][at], speed_of(path, counts)[1000]
+    assert np.allclose(omega[(at > 3000) & (at < 20_000)], true, rtol=2e-3)
+    turned = omega[(at > 20_000 + edge_timer.TAKES + DELAY + 200) & (at < 20_000 + 500)]
+    assert (np.abs(turned) == 0).all() and np.allclose(omega[(at > 22_000) & (at < 40_000)], -true, rtol=2e-3)
+    assert len(np.unique(out["count"][-20_000:])) > 1 and np.abs(omega[at > 50_000]).max() == 0
 
 
 def test_bounce_and_glitches_below_the_filter_change_nothing():

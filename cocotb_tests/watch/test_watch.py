@@ -3,35 +3,49 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import queue
 import shutil
 import socket
 import subprocess
+import sys
 import threading
 import time
 from urllib.request import urlopen
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
+from bokeh.client import pull_session
 
 from cocotb_tests.support.drives import PAPER
-from fluxproof.checkout import ROOT
+from fluxproof.checkout import DRIVES, ROOT
 from fluxproof.command import main
+from fluxproof.commission.session import Step
+from fluxproof.commission.simulated import SimulatedBus, board_of
 from fluxproof.cosim.scenarios import everything
 from fluxproof.diagnosis.example import motor
 from fluxproof.diagnosis.replay.capture import capture, packets
+from fluxproof.diagnosis.replay.telemetry_stream import values
 from fluxproof.plant import IMPOSED_SPEED
-from fluxproof.watch.explain import Explainer
+from fluxproof.watch.commissioning import Page, Story, Watched
+from fluxproof.watch.curves import thinned
+from fluxproof.watch.explain import Explainer, Explanation
 from fluxproof.watch.live import Live
 from fluxproof.watch.packets import Packets
-from fluxproof.watch.page import Scene, allowed, serve, thinned, token_for
+from fluxproof.watch.page import Scene, state_of, view
 from fluxproof.watch.replay import LiveReplay
+from fluxproof.watch.server import allowed, serve, token_for
 from fluxproof.watch.sinks import PlotJuggler
 from fluxproof.watch.source import Tcp, source_of
 from golden_model import drive as drives
 from golden_model.drive_keys import DriveError
-from golden_model.io.telemetry_words import COUNT
+from golden_model.estimators.flux_monitor import CONDITIONS, FAULTS
+from golden_model.io.telemetry_words import COUNT, LAYOUT
 from golden_model.registers import registers
+from studies.live import browser
+from studies.live.browser import TEXT
 
 DRIVE = drives.load(PAPER)
 SET = registers(DRIVE)
@@ -193,40 +207,110 @@ def test_plotjuggler(words):
     sink.close()
 
 
-@pytest.mark.slow
-def test_page(words):
-    """The page is served and a session's curves hold the rows, its texts the replay; without the token nothing."""
-    from bokeh.client import pull_session
-    from bokeh.models import Div
-
-    live = Live(Pieces(raw(words)), 5000, LiveReplay(SET))
-    live.pump()
-    server, url = serve(Scene(live, DRIVE, None, "secret"), "127.0.0.1", 0)
+@contextlib.contextmanager
+def served(shown):
+    """The address of a page with a token, served by a thread."""
+    server, url = serve(shown, "127.0.0.1", 0, "secret")
     thread = threading.Thread(target=server.io_loop.start)
     thread.start()
     try:
-        assert b"Fluxproof" in urlopen(url, timeout=10).read()
-        bare = url.split("?")[0]
-        session = pull_session(url=bare, arguments={"token": "secret"})
-        time.sleep(0.6)
-        session.pull()
-        line = session.document.select_one({"name": "i_q"})
-        assert len(line.data_source.data["x"]) > 100
-        assert max(line.data_source.data["x"]) == pytest.approx(
-            2499 * DRIVE.sample_time_s, abs=10 * DRIVE.sample_time_s
-        )
-        texts = [d.text for d in session.document.select({"type": Div})]
-        assert any("equal over 2,500 samples" in text for text in texts)
-        session.close()
-        session = pull_session(url=bare)
-        assert session.document.select_one({"name": "i_q"}) is None
-        session.close()
+        yield url
     finally:
         server.io_loop.add_callback(server.io_loop.stop)
         thread.join()
         server.stop()
+
+
+LAST = "window.Bokeh?.documents?.[0]?.get_model_by_name('i_q')?.data_source.data.x.at(-1)"
+FOCUSED = """(() => { let e = document.activeElement;
+  while (e.shadowRoot?.activeElement) e = e.shadowRoot.activeElement; return e; })()"""
+
+
+@pytest.mark.slow
+def test_page_in_a_browser(words, tmp_path):
+    """The page as a user has it: curves move, a trip and a wrong bit are told, every control has a name and a key."""
+    if browser.CHROMIUM is None:
+        pytest.skip("chromium is not installed (Debian package chromium)")
+    source = Pieces(raw(words[:600]))
+    live = Live(source, 5000, LiveReplay(SET))
+    live.pump()
+    explainer = Explainer(live, DRIVE, str(PAPER), SET, 1.0)
+    scene = Scene(live, DRIVE, explainer)
+
+    def more(rows) -> float:
+        source.pieces.append(raw(rows))
+        live.pump()
+        return time.monotonic()
+
+    with served(lambda doc: view(doc, scene)) as url, browser.Browser(url, tmp_path) as page:
+        page.until(f"document.title == 'Fluxproof' && {LAST} > 0")
+        period = DRIVE.sample_time_s
+        assert page.js(LAST) == pytest.approx(599 * period, abs=10 * period)
+        more(words[600:1200])
+        page.until(f"{LAST} > {1180 * period}")
+        assert "digital: equal over 1,200 samples" in page.js(TEXT) and "gates on" in page.js(TEXT)
+
+        off = int(np.flatnonzero(np.diff(live_run := values(words, LAYOUT["run"])) < 0)[0]) + 1
+        assert off > 1200 and live_run[off] == 0
+        told = more(words[1200 : off + 50])
+        page.until(f"{TEXT}.includes('sample {off}: gates off')")
+        assert time.monotonic() - told < 5.0  # a busy machine; `make live` measures it
+        wrong = words[off + 50 : off + 60].copy()
+        wrong[2, 11] ^= 4
+        more(wrong)
+        page.until(f"{TEXT}.includes('sample {off + 52}, signal i_d, bit 2')")
+        explainer.found.append(Explanation(off, "explained", "Dead time: 3.1 <V>"))
+        page.until(f"{TEXT}.includes('explained: Dead time: 3.1 <V>')")
+
+        named = {name for _, name in page.names("button", "combobox")}
+        assert named >= {"Window [s]", "Hold", "Hold when the gates go off", "Export what is shown (Parquet)"}
+        assert all(named)
+        focus_on(page, "Hold")
+        page.key(" ")
+        page.until("Bokeh.documents[0].get_model_by_name('hold').active")
+        shown = page.js(LAST)
+        more(words[off + 60 : off + 200])
+        page.until(f"{TEXT}.includes('{off + 200:,} rows')")
+        assert page.js(LAST) == shown
+        focus_on(page, "Export what is shown (Parquet)")
+        page.key("Enter")
+        end = time.monotonic() + 30.0
+        while not (saved := list(tmp_path.glob("*.parquet"))) and time.monotonic() < end:
+            time.sleep(0.05)
+        assert pq.read_table(saved[0]).num_rows == off + 60
+
+
+def focus_on(page: browser.Browser, label: str) -> None:
+    """Tab until the control with this label has the focus."""
+    for _ in range(60):
+        page.key("Tab")
+        if page.js(f"{FOCUSED}?.textContent == {json.dumps(label)}"):
+            return
+    raise AssertionError(f"{label} has no place among the keys")
+
+
+@pytest.mark.slow
+def test_token(words):
+    """Without the token a session has nothing of the drive."""
+    live = watched(raw(words[:100]))
+    with served(lambda doc: view(doc, Scene(live, DRIVE, None))) as url:
+        assert b"Fluxproof" in urlopen(url, timeout=10).read()
+        bare = url.split("?")[0]
+        for arguments, seen in (({"token": "secret"}, True), ({}, False), ({"token": "secre"}, False)):
+            session = pull_session(url=bare, arguments=arguments)
+            assert (session.document.select_one({"name": "i_q"}) is not None) == seen
+            session.close()
     assert token_for("127.0.0.1") is None and len(token_for("0.0.0.0")) >= 20
-    assert not allowed(Scene(live, DRIVE, None, "a"), {}) and allowed(Scene(live, DRIVE, None, None), {})
+    assert not allowed("a", {}) and allowed(None, {})
+
+
+def test_flags_in_words(words):
+    """The flags of the last row by name; the flux monitor's bits too."""
+    fields = watched(raw(words[:50])).look(10).fields | {"flux_faults": np.array([36]), "sat_q": np.array([1])}
+    assert state_of(fields | {"run": np.array([0])}).startswith("gates off, ")
+    said = state_of(fields)
+    assert "u_q at its limit" in said and said.endswith("current model at its range, compensation at its limit")
+    assert len(CONDITIONS) == FAULTS.int_bits
 
 
 def test_thinned_keeps_peaks():
@@ -251,3 +335,41 @@ def test_the_explanation_of_the_last_seconds_names_what_is_hidden(tmp_path):
     found = Explainer(live, drive, str(path), register_set, 1.0).explain()
     assert found.verdict == "explained" and found.counter == len(samples) - 1, found
     assert all(name in found.text for name in ("Dead time", "ncoder offset", "agnet flux")), found.text
+
+
+def test_what_the_page_of_a_commissioning_tells():
+    """Steps, what runs and the end in order; a page that does not keep up costs rows of the picture alone."""
+    story = Story()
+    for message in (("now", "offsets"), ("row", (0.1, (1, 2, 3, 4, 5, 6))), ("row", (0.2, (1, 2, 3, 4, 5, 7)))):
+        story.take(*message)
+    assert "offsets" in story.told() and story.picture()[1].tolist() == [[1, 2, 3, 4, 5, 6], [1, 2, 3, 4, 5, 7]]
+    story.take("step", Step("offsets", {}, "b 2007 < codes"))
+    story.take("end", "refused: the shaft is held")
+    told = story.told()
+    assert told.index("b 2007 &lt; codes") < told.index("refused: the shaft is held") and ">now<" not in told
+
+    page = Page.__new__(Page)  # without its process
+    page.messages, page.left_out = queue.Queue(2), 0
+    bus = Watched(SimulatedBus(DRIVE, board_of(DRIVE)), page)
+    rows = [bus.snapshot() for _ in range(3)]
+    assert page.left_out == 1 and page.messages.qsize() == 2
+    kind, (_, integers) = page.messages.get()
+    assert kind == "row" and integers[0] == rows[0]["i_d"] and integers[-1] == rows[0]["theta_me"]
+
+
+@pytest.mark.slow
+def test_a_commissioning_in_a_browser(tmp_path):
+    """The first step appears while the others run, and the end."""
+    if browser.CHROMIUM is None:
+        pytest.skip("chromium is not installed (Debian package chromium)")
+    command = [sys.executable, "-m", "fluxproof", "commission", str(DRIVES / "servo_24v.toml")]
+    command += ["--watch", "--port", "0"]
+    child = subprocess.Popen([*command, "--out", str(tmp_path / "out")], stdout=subprocess.PIPE, text=True)
+    try:
+        with browser.Browser(child.stdout.readline().split()[-1], tmp_path) as page:
+            page.until(f"{TEXT}.includes('codes') && {TEXT}.includes('now')", 300.0)
+            assert "accepted" not in page.js(TEXT)
+            page.until(f"{TEXT}.includes('accepted')", 300.0)
+    finally:
+        child.kill()
+        child.wait()

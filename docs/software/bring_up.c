@@ -212,7 +212,8 @@ static void enable_gates(void)
 {
     wait_writing((uint32_t)(1 + 66 * 2e6 * get(AT(carrier_half)) / get(AT(clock_hz))), AT(enable), 0);
     put(AT(enable), 1);
-    wait_writing(1000, AT(enable), 1);
+    /* the gates go on at a valley; the bootstraps charge first */
+    wait_writing((uint32_t)(1000 + 2e6 * get(AT(charge_samples)) * get(AT(carrier_half)) / get(AT(clock_hz))), AT(enable), 1);
     if (!flag(FLUXPROOF__FLAGS__RUNNING_bm))
         fail("gates do not start: flags 0x%04x, first_fault 0x%02x", (unsigned)get(AT(flags)),
              (unsigned)get(AT(first_fault)));

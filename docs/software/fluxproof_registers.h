@@ -191,6 +191,9 @@ extern "C" {
 #define FLUXPROOF__FLAGS__DOUBLE_USED_bm 0x8000
 #define FLUXPROOF__FLAGS__DOUBLE_USED_bp 15
 #define FLUXPROOF__FLAGS__DOUBLE_USED_bw 1
+#define FLUXPROOF__FLAGS__REGEN_LIMITED_bm 0x10000
+#define FLUXPROOF__FLAGS__REGEN_LIMITED_bp 16
+#define FLUXPROOF__FLAGS__REGEN_LIMITED_bw 1
 #define FLUXPROOF__FLAGS__MOTOR_DIFFERS_bm 0x1000000
 #define FLUXPROOF__FLAGS__MOTOR_DIFFERS_bp 24
 #define FLUXPROOF__FLAGS__MOTOR_DIFFERS_bw 1
@@ -793,11 +796,29 @@ extern "C" {
 #define FLUXPROOF__EMF_L__VALUE_bw 24
 #define FLUXPROOF__EMF_L__VALUE_reset 0x0
 
+// reg - fluxproof::regen_start
+#define FLUXPROOF__REGEN_START__VALUE_bm 0x1ffff
+#define FLUXPROOF__REGEN_START__VALUE_bp 0
+#define FLUXPROOF__REGEN_START__VALUE_bw 17
+#define FLUXPROOF__REGEN_START__VALUE_reset 0x0
+
 // reg - fluxproof::double_update
 #define FLUXPROOF__DOUBLE_UPDATE__VALUE_bm 0x1
 #define FLUXPROOF__DOUBLE_UPDATE__VALUE_bp 0
 #define FLUXPROOF__DOUBLE_UPDATE__VALUE_bw 1
 #define FLUXPROOF__DOUBLE_UPDATE__VALUE_reset 0x0
+
+// reg - fluxproof::regen_slope
+#define FLUXPROOF__REGEN_SLOPE__VALUE_bm 0xffff
+#define FLUXPROOF__REGEN_SLOPE__VALUE_bp 0
+#define FLUXPROOF__REGEN_SLOPE__VALUE_bw 16
+#define FLUXPROOF__REGEN_SLOPE__VALUE_reset 0x0
+
+// reg - fluxproof::charge_samples
+#define FLUXPROOF__CHARGE_SAMPLES__VALUE_bm 0x3ff
+#define FLUXPROOF__CHARGE_SAMPLES__VALUE_bp 0
+#define FLUXPROOF__CHARGE_SAMPLES__VALUE_bw 10
+#define FLUXPROOF__CHARGE_SAMPLES__VALUE_reset 0x0
 
 // reg - fluxproof::use_table
 #define FLUXPROOF__USE_TABLE__VALUE_bm 0x1
@@ -1319,6 +1340,12 @@ extern "C" {
 #define FLUXPROOF__INDEX_ONCE__VALUE_bw 1
 #define FLUXPROOF__INDEX_ONCE__VALUE_reset 0x0
 
+// reg - fluxproof::whole_lines
+#define FLUXPROOF__WHOLE_LINES__VALUE_bm 0x1
+#define FLUXPROOF__WHOLE_LINES__VALUE_bp 0
+#define FLUXPROOF__WHOLE_LINES__VALUE_bw 1
+#define FLUXPROOF__WHOLE_LINES__VALUE_reset 0x0
+
 // reg - fluxproof::clock_ratio
 #define FLUXPROOF__CLOCK_RATIO__VALUE_bm 0x1f
 #define FLUXPROOF__CLOCK_RATIO__VALUE_bp 0
@@ -1641,9 +1668,11 @@ typedef struct {
     uint32_t emf_w;
     uint32_t emf_samples;
     uint32_t emf_l;
-    uint8_t RESERVED_23c_23f[0x4];
+    uint32_t regen_start;
     uint32_t double_update;
-    uint8_t RESERVED_244_24f[0xc];
+    uint32_t regen_slope;
+    uint32_t charge_samples;
+    uint8_t RESERVED_24c_24f[0x4];
     uint32_t use_table;
     uint32_t k_flux;
     uint32_t u_share;
@@ -1742,7 +1771,7 @@ typedef struct {
     uint32_t position_delay;
     uint32_t bridge_max;
     uint32_t index_once;
-    uint8_t RESERVED_55c_55f[0x4];
+    uint32_t whole_lines;
     uint32_t clock_ratio;
     uint32_t spi_bits;
     uint32_t spi_skip;

@@ -33,45 +33,55 @@ def run_folder(toplevel: str, generics: dict, rtl: Path = RTL, key: str = "") ->
 
 
 def build(toplevel: str, rtl: Path = RTL, extra=()) -> Path:
-    """Analyse and elaborate ``toplevel`` once per state of the sources it needs; the folder it is in.
+    """Analyse and elaborate ``toplevel`` once per state of the VHDL; the folder it is in.
 
-    An entity with records as ports is built inside a flat top (cosim/flat.py).  Generics are set when the simulation
-    starts, so all configurations share a build, and so do processes that run at the same time.  Raises BuildError with
-    GHDL's words where the VHDL does not build.
+    All tops of a state share a library, in which GHDL analyses a file for the first top that needs it.  An entity with
+    records as ports is built inside a flat top (cosim/flat.py).  Generics are set when the simulation starts, so all
+    configurations share a build, and so do processes that run at the same time.  Raises BuildError with GHDL's words
+    where the VHDL does not build.
     """
     toplevel, around = flat_top(toplevel, rtl, extra)
-    sources = closure(toplevel, rtl, [*extra, *around])
+    closure(toplevel, rtl, [*extra, *around])  # raises ValueError where a file is missing or declared twice
+    sources = [*sorted(rtl.rglob("*.vhd")), *extra]
     state = hashlib.sha256(os.environ.get("GHDL_BACKEND", "").encode())
     for path in sources:
         state.update(f"{path}\n".encode() + path.read_bytes())
     # A copy of the RTL, such as a planted defect's, keeps its builds and takes them along when it is deleted.
     builds = BUILD / "ghdl" if rtl == ROOT / "rtl" else rtl / ".ghdl"
-    folder = builds / f"{toplevel}-{state.hexdigest()[:16]}"
+    folder = builds / state.hexdigest()[:16]
     builds.mkdir(parents=True, exist_ok=True)
-    with open(builds / f"{toplevel}.lock", "w") as lock:
+    with open(builds / f"{folder.name}.lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if (folder / "built").exists():
-            os.utime(folder)
-            return folder
-        for old in builds.glob(f"{toplevel}-{'?' * 16}"):
-            if old == folder or time.time() - old.stat().st_mtime > KEPT_S:
+        for old in builds.iterdir():
+            if old.is_dir() and old != folder and time.time() - old.stat().st_mtime > KEPT_S:
                 shutil.rmtree(old)
-        try:
-            get_runner("ghdl").build(
-                sources=sources,
-                hdl_library="top",
-                hdl_toplevel=toplevel,
-                build_args=["--std=08"],
-                build_dir=folder,
-                always=True,
-                log_file=_log(folder, "build.log"),
-            )
-        except (SystemExit, RuntimeError, subprocess.CalledProcessError) as error:
-            words = (folder / "build.log").read_text().splitlines() if (folder / "build.log").exists() else []
-            errors = [line for line in words if "error" in line or ".vhd:" in line] or words
-            raise BuildError(f"{toplevel} does not build: " + "\n".join(errors[-12:] or [str(error)])) from error
-        (folder / "built").touch()
+        if not (folder / "files").exists():
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir()
+            _ghdl("-i", folder, toplevel, sources)
+            (folder / "files").touch()
+        os.utime(folder)
+        built = folder / f"{toplevel}.built"
+        if not built.exists():
+            if around:
+                _ghdl("-i", folder, toplevel, around)
+            _ghdl("-m", folder, toplevel, [toplevel])
+            built.touch()
     return folder
+
+
+def _ghdl(what: str, folder: Path, toplevel: str, rest) -> None:
+    """One of GHDL's commands on a library; BuildError with its words."""
+    command = ["ghdl", what, "--std=08", "--work=top", f"--workdir={folder}", *map(str, rest)]
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    except FileNotFoundError:
+        raise BuildError(f"{toplevel} does not build: ghdl is not installed (make setup)") from None
+    (folder / f"{toplevel}.log").write_text(done.stdout + done.stderr)
+    if done.returncode:
+        words = (done.stdout + done.stderr).splitlines()
+        errors = [line for line in words if "error" in line or ".vhd:" in line] or words
+        raise BuildError(f"{toplevel} does not build: " + "\n".join(errors[-12:]))
 
 
 def run(

@@ -111,6 +111,13 @@ def tour(drive: Drive) -> Scenario:
     )
 
 
+def braking(drive: Drive) -> Scenario:
+    """300 periods from 0.4 of the rated speed through zero, while the bus rises by a fifth and falls again."""
+    t, bus, rated = 300 * drive.sample_time_s, drive.inverter.dc_bus_v, drive.machine.rated_speed_rad_s / RPM
+    rises = {(0.1 + 0.02 * k) * t: (1.0 + 0.01 * (k if k <= 20 else 40 - k)) * bus for k in range(41)}
+    return scenario(drive, t, rpm={0.0: 0.4 * rated, 0.1 * t: -0.2 * rated}, u_dc=rises, start_rpm=0.4 * rated)
+
+
 def full_speed(drive: Drive) -> Scenario:
     """On a bus of 300 V towards the rated speed and back through zero: long periods at the voltage limit."""
     return scenario(drive, 0.4, rpm={0.0: 2900, 0.2: -2900}, u_dc={0.0: 300.0})
@@ -127,5 +134,6 @@ SCENARIOS = {
     "everything": everything,
     "compressed": compressed,
     "full_speed": full_speed,
+    "braking": braking,
     "tour": tour,
 }

@@ -142,7 +142,7 @@ void core_read(const Core* core, const int32_t* ports, int64_t count, int64_t* v
 // `sample_at` sees sample_valid high (none does if that is never reached).  clocks[] and words[] take at
 // most `most` + 1 entries: the number of the tick after which the gate word was new, and that word; number 0
 // means that it had changed before, since the last call.  facts: entries written; the tick after which
-// duty_valid was high, and values_valid (0: none).
+// duty_valid was high, and values_valid (0: none); `running` as the tick `sample_at` finds it.
 // A top without gates makes no period: -1.
 int64_t core_run_period(Core* core, int64_t most, int64_t sample_at, int32_t* clocks, uint8_t* words,
                         int64_t* facts) {
@@ -160,10 +160,13 @@ int64_t core_run_period(Core* core, int64_t most, int64_t sample_at, int32_t* cl
     };
     look(0);
     int64_t k = 0;
-    facts[1] = facts[2] = 0;
+    facts[1] = facts[2] = facts[3] = 0;
     while (k < most) {
         ++k;
         top.sample_valid = k == sample_at;
+#ifdef CORE_SHOWS_VALIDS
+        if (k == sample_at) facts[3] = top.running;
+#endif
         core->tick();
         look(k);
 #ifdef CORE_SHOWS_VALIDS

@@ -75,6 +75,7 @@ class VerilatedCore:
         self._index = {name: k for k, name in enumerate(self.ports)}
         self._lists: dict[tuple[str, ...], np.ndarray] = {}
         self._edges = (np.empty(0, np.int32), np.empty(0, np.uint8))
+        self.running_at = 0  # running when the sample of the last run_period entered
         self.duty_at = self.values_at = 0  # ticks of the last run_period that raised the two valids, 0: none
         self._library = _load(folder / LIBRARY)
         self._handle = self._library.core_new()
@@ -207,10 +208,10 @@ class VerilatedCore:
             self.set_many(sample)
         if len(self._edges[0]) <= max_clocks:
             self._edges = (np.empty(max_clocks + 1, np.int32), np.empty(max_clocks + 1, np.uint8))
-        facts = np.empty(3, np.int64)
+        facts = np.empty(4, np.int64)
         at = 0 if sample is None else sample_at
         clocks = self._library.core_run_period(self._handle, max_clocks, at, *self._edges, facts)
-        found, self.duty_at, self.values_at = facts.tolist()
+        found, self.duty_at, self.values_at, self.running_at = facts.tolist()
         if clocks < at:
             raise RuntimeError(f"the sample of tick {at} never entered: the call ended after {clocks}")
         return clocks, self._edges[0][:found].copy(), self._edges[1][:found].copy()

@@ -32,12 +32,12 @@ class VerilatedDevice:
         return self._finish(*self.core.run_period(self.limit), None, 0, 0)
 
     async def period(self, inputs: dict[str, int], enable: int) -> Period:
-        running = self.core.get("running") & enable
         self.core.set("enable", enable)
         at = SAMPLE_DELAY + 1
         ended = self.core.run_period(self.limit, sample=inputs, sample_at=at)
         # A tick's outputs are seen by the next one: hence one clock more than the ticks between.
-        return self._finish(*ended, self.core.get_many(Observed._fields), self.core.duty_at - at + 1, running)
+        core = self.core
+        return self._finish(*ended, core.get_many(Observed._fields), core.duty_at - at + 1, core.running_at)
 
     def change(self, registers) -> None:
         self.core.set_many(registers)

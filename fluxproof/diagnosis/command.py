@@ -9,6 +9,7 @@ with one line on stderr for unusable input (fluxproof/command.py).  Slow imports
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import sys
 import webbrowser
 from pathlib import Path
@@ -28,6 +29,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     example = "make a recording of a simulated motor that differs from its drive file, and diagnose it"
     parser.add_argument("--example", action="store_true", help=example)
     parser.add_argument("--out", metavar="DIR", help=f"folder for the results (default: {FOLDER}/NAME OF RECORDING)")
+    named = "a column of the file by its canonical name and unit, such as 'Dev1_ai0=u_ab' or 'n=omega_e [rpm]'"
+    parser.add_argument("--column", metavar="NAME=CANONICAL", action="append", default=[], help=named)
     prior = "fleet.parquet of `fluxproof fleet` for the same drive file, used as prior"
     parser.add_argument("--prior", metavar="fleet.parquet", help=prior)
     parser.add_argument("--open", action="store_true", help="show the report in the browser")
@@ -38,10 +41,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Diagnose, write the outputs, print the answer; returns 0."""
     check_inputs(args)
+    from fluxproof.diagnosis.ingest.entries import entries_of
+
+    named = entries_of(args.column)
     if not args.example:
         from fluxproof.diagnosis.loading.early import refuse_early
 
-        refuse_early(args.recordings, args.drive)
+        refuse_early(args.recordings, args.drive, named)
     from fluxproof.diagnosis.ground.nominal import load_nominal
     from fluxproof.diagnosis.session import run as session
 
@@ -49,6 +55,7 @@ def run(args: argparse.Namespace) -> int:
     with Progress(quiet=args.quiet) as progress:
         recordings, drive = make_example(out, progress) if args.example else (args.recordings, args.drive)
         nominal = load_nominal(drive)
+        nominal = dataclasses.replace(nominal, columns=nominal.columns | named)
         answer = session(recordings, nominal, out, progress, args.prior)
     lines = answer_lines(answer, nominal, out)
     if args.example:

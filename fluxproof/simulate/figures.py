@@ -15,11 +15,10 @@ from fluxproof.cosim.scenarios import RPM
 from fluxproof.simulate import scene as scenes
 from fluxproof.simulate.regeneration import Regeneration
 from fluxproof.simulate.run import Run
-from fluxproof.simulate.scene import Stage
+from fluxproof.simulate.scene import TAIL, Stage
 from golden_model import supply
 from golden_model.drive import Drive
 
-TAIL = 0.15  # of a stage, at its end: what must have settled
 BAND = 0.02  # of the top speed: back within it after the load step
 
 
@@ -120,6 +119,8 @@ def of_supply(drive: Drive, run: Run, back: Regeneration) -> dict:
         ohm = back.resistor_ohm if math.isfinite(back.resistor_ohm) else None
         found["brake_resistor_at_most"] = figure(ohm, "ohm", "calculated")
         found["brake_resistor_on_from"] = figure(back.on_v, "V", "calculated")
+    if drive.protection.regen_start_v is not None:
+        found["braking_limited_by_the_bus"] = figure(run["regen_limited"].sum() * period, "s")
     if drive.protection.brake_on_v is not None:
         found["brake_resistor"] = figure(supply.brake_resistor_ohm(drive), "ohm", "calculated")
         found["brake_resistor_energy"] = figure(braked.sum() * period, "J")

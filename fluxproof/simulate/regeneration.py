@@ -56,4 +56,5 @@ def told(drive: Drive, found: Regeneration) -> str:
         needs = f"a brake resistor of at most {found.resistor_ohm:.3g} ohm from {found.on_v:.4g} V on (brake_on_v)"
     else:
         needs = f"a brake resistor of at most {found.resistor_ohm:.3g} ohm"
-    return f"{back}, u_dc_max is {trip_v(drive):.4g} V: it needs {needs}, or a [supply] that takes it back"
+    others = "a [supply] that takes it back, or less braking current (regen_start_v)"
+    return f"{back}, u_dc_max is {trip_v(drive):.4g} V: it needs {needs}, {others}"

@@ -79,7 +79,7 @@ def run(
         result = _simulate(drive, register_set, scene, progress)
     observed = result.observed
     signals = {name: to_si(name, observed[name], drive) for name in IN_SI}
-    signals |= {name: observed[name] for name in ("sat_d", "sat_q", "speed_limited", "flux_faults")}
+    signals |= {name: observed[name] for name in ("sat_d", "sat_q", "speed_limited", "regen_limited", "flux_faults")}
     signals |= {f"true_{name}": values for name, values in result.plant.items()}
     compare = np.array([observed[f"compare_{x}"] for x in "abc"]).T
     t = np.arange(len(scene.scenario)) * drive.sample_time_s

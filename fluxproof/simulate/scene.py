@@ -16,11 +16,14 @@ from fluxproof.cosim.scenarios import RPM, scenario
 from fluxproof.plant.transforms import linear_limit
 from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError
+from golden_model.protection_limits import regen_end_v
 from golden_model.scaling import speed_gains
 from golden_model.units import from_si
 
+TAIL = 0.15  # of a stage, at its end: what must have settled
 LOW, TOP, LOADED = 0.3, 0.8, 0.5  # of the rated speed, twice, and of the current limit
 OF_REACH = 0.9  # of the speed at which the loaded drive fills the voltage circle
+LONGEST_COAST_S = 20.0  # a shaft that coasts longer, with a bus that takes no more, is not waited for
 LONGEST_S = 1.0  # an acceleration that takes longer is one to a lower speed
 MOST_PERIODS = 1_000_000  # about half a minute of computing
 SETTLE = 30.0  # over the crossover of the speed loop [rad/s]: six time constants of its integral
@@ -110,6 +113,8 @@ def speed_scene(drive: Drive) -> Scene:
     stages, now = [], 0.0
     for name, speed, torque, change in plan:
         length = settle + 1.3 * change / per_s
+        if name == "reversal":
+            length += coast_s(drive, top) / (1.0 - TAIL)
         first = round(now / drive.sample_time_s)
         now += length
         stages.append(Stage(name, first, round(now / drive.sample_time_s), speed / RPM, torque))
@@ -121,6 +126,25 @@ def speed_scene(drive: Drive) -> Scene:
     rpm = {s.first * t_s: s.reference for s in stages}
     loads = {s.first * t_s: s.load for s in stages}
     return Scene(scenario(drive, stages[-1].end * t_s, rpm, loads), tuple(stages), shortened=shortened)
+
+
+def coast_s(drive: Drive, top: float) -> float:
+    """How long the shaft coasts from ``top`` [rad/s] to rest when the bus takes no more, or 0 where it is not limited.
+
+    The capacitor takes C/2*(u_end**2 - u_dc**2) of the kinetic energy; friction alone takes what is left,
+    J*dw/dt = -T_c - b*w.
+    """
+    m, p = drive.machine, drive.protection
+    if p.regen_start_v is None or p.brake_on_v is not None or drive.supply.source != "diode":
+        return 0.0
+    taken = drive.supply.capacitance_f / 2.0 * (regen_end_v(drive) ** 2 - drive.inverter.dc_bus_v**2)
+    left = math.sqrt(max(top**2 - 2.0 * taken / m.inertia_kgm2, 0.0))
+    b, torque = m.viscous_friction_nms, m.coulomb_friction_nm
+    if torque <= 0.0:
+        return 0.0
+    lost = b * left / torque
+    seconds = m.inertia_kgm2 * left / torque * (math.log1p(lost) / lost if lost > 0.0 else 1.0)
+    return seconds if seconds <= LONGEST_COAST_S else 0.0
 
 
 def crossover(drive: Drive) -> float:

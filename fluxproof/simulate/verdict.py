@@ -11,8 +11,10 @@ import numpy as np
 from fluxproof.simulate.figures import rpm, tail
 from fluxproof.simulate.margins import Margins
 from fluxproof.simulate.run import Run
+from fluxproof.simulate.scene import Stage
 from golden_model import supply
 from golden_model.drive import Drive
+from golden_model.protection_limits import regen_end_v
 from golden_model.scaling import leg_loss_v
 
 MOST_KEYS = 8  # of [plant.*], in a line
@@ -58,8 +60,19 @@ def unsettled(drive: Drive, run: Run) -> str:
         spread = float(np.std(rpm(run)[end]))
         if away > most or spread > most:
             said = f"the speed is {away:.4g} rpm from {stage.reference:.4g} rpm, swinging by {spread:.3g} rpm rms,"
-            return f"{said} at the end of {stage.name!r}: at most {most:.3g} rpm"
+            return f"{said} at the end of {stage.name!r}: at most {most:.3g} rpm{_coasting(drive, run, stage)}"
     return ""
+
+
+def _coasting(drive: Drive, run: Run, stage: Stage) -> str:
+    """That the bus voltage has limited the braking current in the stage, so that the shaft coasts."""
+    limited = run["regen_limited"][stage.first : stage.end].sum() * drive.sample_time_s
+    if not limited:
+        return ""
+    p = drive.protection
+    most = f"from regen_start_v = {p.regen_start_v:g} V to {regen_end_v(drive):g} V"
+    ends = "what the capacitor does not take is left to friction: a brake resistor (brake_on_v) takes it"
+    return f"; the bus voltage limits the braking current {most}, here for {limited:.3g} s, and {ends}"
 
 
 def _unlearnt(drive: Drive, run: Run, end: slice) -> str:

@@ -99,11 +99,13 @@ def _show(args, live, drive, explainer) -> None:
             time.sleep(0.1)
         return
     try:
-        from fluxproof.watch.page import Scene, serve, token_for
+        from fluxproof.watch.page import Scene, view
+        from fluxproof.watch.server import serve, token_for
     except ImportError:
         raise DriveError("the page needs bokeh: pip install 'fluxproof[fleet]', or --no-page") from None
     try:
-        server, url = serve(Scene(live, drive, explainer, token_for(args.listen)), args.listen, args.port)
+        scene = Scene(live, drive, explainer)
+        server, url = serve(lambda doc: view(doc, scene), args.listen, args.port, token_for(args.listen))
     except OSError as error:
         raise DriveError(f"--listen {args.listen} --port {args.port}: {error.strerror or error}") from None
     say(f"watching {args.source}: {url}")

@@ -1,37 +1,31 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The page of ``fluxproof watch``: a Bokeh server that looks at the rows ten times a second.
-
-It listens at the loopback address; at another one every view needs the token of the address that is printed.
-"""
+"""The page of ``fluxproof watch``, which looks at the rows ten times a second."""
 
 from __future__ import annotations
 
-import hmac
+import asyncio
 import io
-import secrets
 from html import escape
 from typing import NamedTuple
 
 import numpy as np
+from bokeh.document import Document, without_document_lock
 from bokeh.layouts import column, row
 from bokeh.models import Button, ColumnDataSource, CustomJS, Div, Select, Toggle
 from bokeh.plotting import figure
-from bokeh.server.server import Server
 
+from fluxproof.watch.curves import COLOURS, PICTURE_MS, POINTS, WIDE, plot, thinned
 from fluxproof.watch.explain import Explainer
 from fluxproof.watch.live import Live, Look
 from fluxproof.watch.sinks import scales_of, table
 from golden_model.drive import Drive
+from golden_model.estimators.flux_monitor import CONDITIONS
 from golden_model.units import si_per_lsb
 
-LOOPBACK = ("127.0.0.1", "::1", "localhost")
-PICTURE_MS = 100
-POINTS = 500  # pairs of smallest and largest value of a curve
 WINDOWS_S = ("0.05", "0.2", "1", "5", "20")
 SHOWN = ("i_d", "i_q", "i_q_ref", "omega_me", "omega_ref", "lambda_d", "lambda_q", "u_d", "u_q", "u_dc")
-FLAGS = ("run", "speed_mode", "current_at_rail", "temp_lost", "psi_held", "flux_faults", "sat_d", "sat_q")
-COLOURS = {"i_d": "#0072b2", "i_q": "#d55e00", "i_q_ref": "#000000", "speed": "#0072b2", "speed_ref": "#000000",
-           "torque": "#009e73"}  # fmt: skip
+FLAGS = {"current_at_rail": "current converter at its end", "temp_lost": "no winding temperature",
+         "psi_held": "psi_m held", "sat_d": "u_d at its limit", "sat_q": "u_q at its limit"}  # fmt: skip
 
 
 class Scene(NamedTuple):
@@ -40,18 +34,6 @@ class Scene(NamedTuple):
     live: Live
     drive: Drive
     explainer: Explainer | None
-    token: str | None
-
-
-def thinned(time_s: np.ndarray, curve: np.ndarray, points: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest and largest value of each of ``points`` stretches: no peak is lost."""
-    size = -(-len(curve) // points)
-    if size < 2:
-        return time_s, curve
-    count = len(curve) // size
-    cut = curve[len(curve) - count * size :].reshape(count, size)
-    at = time_s[len(curve) - count * size :: size]
-    return np.repeat(at, 2), np.column_stack([cut.min(axis=1), cut.max(axis=1)]).ravel()
 
 
 def curves(look: Look, drive: Drive) -> dict[str, np.ndarray]:
@@ -62,26 +44,13 @@ def curves(look: Look, drive: Drive) -> dict[str, np.ndarray]:
     return si | {"speed": si["omega_me"] * rpm, "speed_ref": si["omega_ref"] * rpm, "torque": torque}
 
 
-def serve(scene: Scene, address: str, port: int) -> tuple[Server, str]:
-    """(the server, started; the address of its page); with the token that ``scene`` has."""
-    origins = None
-    if address not in LOOPBACK:
-        origins = [f"{address}:{port}"]
-    server = Server({"/": lambda doc: _view(doc, scene)}, port=port, address=address, allow_websocket_origin=origins)
-    server.start()
-    host = f"[{address}]" if ":" in address else address
-    return server, f"http://{host}:{server.port}/" + (f"?token={scene.token}" if scene.token else "")
-
-
-def token_for(address: str) -> str | None:
-    """None for the loopback address; else a new token."""
-    return None if address in LOOPBACK else secrets.token_urlsafe(18)
-
-
-def allowed(scene: Scene, arguments: dict[str, list[bytes]]) -> bool:
-    """Whether a request has the token."""
-    given = (arguments.get("token") or [b""])[0]
-    return scene.token is None or hmac.compare_digest(given, scene.token.encode())
+def state_of(fields: dict[str, np.ndarray]) -> str:
+    """The flags of the last row in words."""
+    last = {name: int(column[-1]) for name, column in fields.items()}
+    said = ["gates on" if last["run"] else "gates off", "speed control" if last["speed_mode"] else "current control"]
+    said += [words for name, words in FLAGS.items() if last[name]]
+    found = [words for bit, words in enumerate(CONDITIONS) if last["flux_faults"] >> bit & 1]
+    return ", ".join(said) + (f"; the flux estimate was disturbed: {', '.join(found)}" if found else "")
 
 
 def parquet_of(look: Look, drive: Drive) -> bytes:
@@ -93,40 +62,27 @@ def parquet_of(look: Look, drive: Drive) -> bytes:
     return out.getvalue()
 
 
-def _view(doc, scene: Scene) -> None:
+def view(doc: Document, scene: Scene) -> None:
     """One browser's view."""
-    doc.title = "Fluxproof"
-    if not allowed(scene, doc.session_context.request.arguments):
-        doc.add_root(Div(text="The address needs the token that `fluxproof watch` printed."))
-        return
     live, drive = scene.live, scene.drive
     sources: dict[str, ColumnDataSource] = {}
 
-    def plot(title: str, names: tuple[str, ...], unit: str):
-        made = figure(
-            title=title, height=200, width=620, y_axis_label=unit, tools="xpan,xwheel_zoom,crosshair,hover,reset"
-        )
-        for name in names:
-            sources[name] = ColumnDataSource({"x": [], "y": []})
-            made.line("x", "y", source=sources[name], color=COLOURS[name], legend_label=name, name=name)
-        made.legend.location = "top_left"
-        return made
-
     plots = [
-        plot("Currents", ("i_d", "i_q", "i_q_ref"), "A"),
-        plot("Speed", ("speed", "speed_ref"), "rpm"),
-        plot("Torque from the flux", ("torque",), "Nm"),
+        plot("Currents", ("i_d", "i_q", "i_q_ref"), "A", sources),
+        plot("Speed", ("speed", "speed_ref"), "rpm", sources),
+        plot("Torque from the flux", ("torque",), "Nm", sources),
     ]
     for other in plots[1:]:
         other.x_range = plots[0].x_range
     plots[-1].xaxis.axis_label = "s since the reset"
-    circle = figure(title="Voltage, its limit u_dc / sqrt 3", height=320, width=320, match_aspect=True, tools="reset")
+    circle = figure(title="Voltage, its limit u_dc / sqrt 3", height=320, width=320, match_aspect=True, tools="")
+    circle.toolbar_location = None
     sources["voltage"] = ColumnDataSource({"x": [], "y": []})
     sources["limit"] = ColumnDataSource({"x": [], "y": []})
     circle.line("x", "y", source=sources["limit"], color="#000000", name="limit")
     circle.scatter("x", "y", source=sources["voltage"], size=2, color="#d55e00", name="voltage")
-    said, digital, why, flags = Div(), Div(), Div(width=420), Div(width=420)
-    window = Select(title="Window [s]", value="1", options=list(WINDOWS_S), name="window")
+    said, digital, why, flags = (Div(width=WIDE - 10) for _ in range(4))
+    window = Select(title="Window [s]", value="1", options=list(WINDOWS_S), name="window", width=80)
     hold = Toggle(label="Hold", name="hold")
     trigger = Toggle(label="Hold when the gates go off", name="trigger")
     export = Button(label="Export what is shown (Parquet)", name="export")
@@ -148,15 +104,19 @@ def _view(doc, scene: Scene) -> None:
             hold.active = True
         held[:] = [look]
         _show(look, drive, sources)
-        flags.text = escape(", ".join(f"{name} {int(look.fields[name][-1])}" for name in FLAGS))
+        flags.text = escape(state_of(look.fields))
 
-    def save() -> None:
+    @without_document_lock
+    async def save() -> None:
+        """In a thread: the first export loads pyarrow, and the pictures go on meanwhile."""
         if held:
-            carried.data = {"file": [np.frombuffer(parquet_of(held[0], drive), np.uint8).tolist()]}
+            file = await asyncio.to_thread(parquet_of, held[0], drive)
+            data = {"file": [np.frombuffer(file, np.uint8).tolist()]}
+            doc.add_next_tick_callback(lambda: carried.update(data=data))
 
-    export.on_click(save)
-    controls = column(row(window, hold, trigger, export), said, digital, flags, why, circle)
-    doc.add_root(row(column(*plots), controls))
+    export.on_click(lambda: doc.add_next_tick_callback(save))
+    controls = column(row(window, hold, trigger), export, digital, said, flags, why, circle, width=WIDE)
+    doc.add_root(row(column(*plots, sizing_mode="stretch_width"), controls, sizing_mode="stretch_width"))
     doc.add_root(carried_root(carried))
     doc.add_periodic_callback(renew, PICTURE_MS)
 
@@ -177,7 +137,7 @@ def carried_root(carried: ColumnDataSource) -> Div:
 
 def _show(look: Look, drive: Drive, sources: dict[str, ColumnDataSource]) -> None:
     si, time_s = curves(look, drive), look.counter * drive.sample_time_s
-    for name in COLOURS:
+    for name in sources.keys() & COLOURS.keys():
         x, y = thinned(time_s, si[name])
         sources[name].data = {"x": x, "y": y}
     some = slice(-POINTS, None)

@@ -4,11 +4,12 @@
     err     = omega_ref - omega_me
     u       = speed_kp*err + integral
     i_q_ref = limit(u, +-i_q_max)
-    integral += speed_ki*err      unless u is beyond the limit and err pushes further
+    integral += speed_ki*err      unless u is beyond the limit and err pushes further, or regen_limited and err brakes
 
 The limit i_q_max is what current_limit leaves beside i_d, in both modes.
 Torque mode (``speed_mode`` = 0): i_q_ref is ``i_q_ext``, limited, and the integral follows it, so that
-a change to speed mode is bumpless.  ``run`` = 0: output and integral are zero.
+a change to speed mode is bumpless.  ``regen_limited``: in the last sample the bus voltage limited the braking
+current, see regeneration_limit.  ``run`` = 0: output and integral are zero.
 
 Formats: err saturated to PU; proportional part rounded half up to S(9,28), which holds every product; increment
 rounded half up to S(1,28), where 2**-16 * ki still counts; the integral is kept within +-i_q_max; sum exact, rounded
@@ -33,14 +34,15 @@ class State(NamedTuple):
 
 
 @kernel
-def step(state, omega_ref, omega_me, i_q_ext, i_q_max, speed_mode, run, speed_kp, speed_ki):
+def step(state, omega_ref, omega_me, i_q_ext, i_q_max, regen_limited, speed_mode, run, speed_kp, speed_ki):
     err = saturate(omega_ref - omega_me, PU_W)
     proportional = round_half_up(speed_kp * err, DROP_P)
     moved = state.integral + round_half_up(speed_ki * err, DROP_I)
     asked = round_half_up(proportional + state.integral, PU_TO_INTEGRAL) if speed_mode else i_q_ext
     i_q_ref = clamp(asked, -i_q_max, i_q_max)
     limited = 1 if asked != i_q_ref else 0
-    held = (asked > i_q_max and err > 0) or (asked < -i_q_max and err < 0)
+    brakes = (err > 0 and omega_me < 0) or (err < 0 and omega_me >= 0)
+    held = (asked > i_q_max and err > 0) or (asked < -i_q_max and err < 0) or (regen_limited and brakes)
     limit = i_q_max << PU_TO_INTEGRAL
     integral = i_q_ref << PU_TO_INTEGRAL
     if speed_mode:
@@ -71,6 +73,7 @@ def stimuli(rng, _config):
         "speed_mode": 1,
         "run": 1,
         "i_q_ext": 12345,
+        "regen_limited": 0,
     }
     rows = []
     for target in (131071, 100, -131072, 0):
@@ -84,6 +87,9 @@ def stimuli(rng, _config):
         for k in range(24):
             err = int(rng.uniform(-1, 1) * wide) if k % 8 else int(rng.integers(-1, 2))
             rows.append({"omega_ref": err + 77, "omega_me": 77, **regs, "speed_mode": int(k != 20)})
+        for k in range(16):  # braking that the bus limits, in both directions, and driving beside it
+            err, omega = (int(s * rng.integers(1, 99)) for s in ((1, -1)[k % 2], (1, -1, 1, 0)[k // 2 % 4]))
+            rows.append({"omega_ref": err + omega, "omega_me": omega, **regs, "regen_limited": int(k % 3 > 0)})
     still, one = {**regs, "speed_ki": 0, "speed_mode": 1}, 1 << KP.frac_bits
     ends = [(PU.lo, PU.hi, PU.hi), (PU.hi, PU.lo, PU.hi)]  # the error at its own ends, shown by gains up to one
     ends += [(end + off, 0, 999) for off in range(-4, 5) for end in (999, -999)]  # the output at its limit
@@ -121,6 +127,7 @@ BLOCK = Block(
         Port("omega_me", PU, doc="electrical speed"),
         Port("i_q_ext", PU, doc="current reference of torque mode"),
         Port("i_q_max", PU, lo=0, doc="limit of the q axis, see current_limit"),
+        Port("regen_limited", BIT, doc="1: the bus voltage limited the braking current of the last sample"),
         Port("speed_mode", BIT, doc="1: speed control, 0: torque control"),
         Port("run", BIT, doc="0: output and integral zero"),
     ),

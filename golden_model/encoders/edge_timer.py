@@ -9,6 +9,10 @@ since the last one, so |omega_me| is at most k_edge / (clocks since the last edg
 An edge after a reversal is the edge passed before, so it moves the shaft by no count: a shaft that trembles on an edge
 has no speed.  The first edge after a reset is where counting begins.
 
+``whole_lines`` = 1 measures over whole lines of four counts instead, by line_timer: the counts up to the next multiple
+of four, over the clocks from the last edge of the same kind before the window; without an edge at most a line in the
+time since the edge a line before the next one.  Uneven counts then do not tremble.  The first line has no speed.
+
 ``k_edge`` = 2*pi * pole_pairs * clock_hz / (counts * omega_base); see ``setting``.  ``reverse`` inverts the sense.
 Formats: k_edge U(20,12), large for the few edges of Hall sensors; counts MOVED_W (16) bits and clocks TIME_W (24)
 bits, both saturating, output PU.  A time beyond TIME_W bits is standstill.
@@ -21,6 +25,7 @@ import math
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
+from golden_model.encoders import line_timer
 from golden_model.fixed import Format
 from golden_model.formats import BIT, PU
 from golden_model.kernel import kernel
@@ -32,6 +37,8 @@ EVER = (1 << TIME_W) - 1  # a reset leaves the longest time there is
 OMEGA_MAX = PU.hi
 APART = 48  # clocks between two edges, for the bench
 TAKES = MOVED_W + QUOTIENT_W + 4  # with MOVED_W as it is by default
+LINE = line_timer.KINDS  # counts
+line_step = line_timer.step
 
 
 class State(NamedTuple):
@@ -52,10 +59,15 @@ class State(NamedTuple):
     past: int = 0  # 1: the quotient is above its range
     omega: int = 0
     omega_valid: int = 0
+    of_lines: line_timer.State = line_timer.State()
+    line_span: int = 0
+    line_known: int = 0
+    next_span: int = 0
+    next_known: int = 0
 
 
 @kernel
-def step(state, step_up, step_down, sample, reverse, k_edge, time_w, moved_w):
+def step(state, step_up, step_down, sample, reverse, k_edge, whole_lines, time_w, moved_w):
     s = state
     time_max, moved_max = (1 << time_w) - 1, (1 << moved_w) - 1
     elapsed, since = min(s.elapsed, time_max), min(s.since, time_max)
@@ -65,6 +77,7 @@ def step(state, step_up, step_down, sample, reverse, k_edge, time_w, moved_w):
     edge = step_up or step_down
     take = sample and s.clock == 0
     forward = 1 if step_up else 0
+    of_lines, lines = line_step(s.of_lines, step_up, step_down, take, since == time_max, time_w)
 
     # The window between two samples; an edge at the sample's clock belongs to the next
     base = since if take and s.edges else elapsed
@@ -80,7 +93,13 @@ def step(state, step_up, step_down, sample, reverse, k_edge, time_w, moved_w):
         measured = s.edges
         divisor = s.span if s.edges else since
         factor = abs(s.moved) if s.edges else 1
-        if divisor == time_max:
+        rest = divisor == time_max
+        if whole_lines and s.edges:
+            divisor = s.line_span
+            factor = min((factor + LINE - 1) & ~(LINE - 1), moved_max & ~(LINE - 1)) if s.line_known else 0
+        elif whole_lines and s.next_known:
+            factor, divisor = LINE, s.next_span
+        if rest:
             factor = 0
         negative = 1 if (s.moved < 0) != (reverse == 1) else 0
         work, quotient = 0, 0
@@ -125,6 +144,11 @@ def step(state, step_up, step_down, sample, reverse, k_edge, time_w, moved_w):
         past,
         omega,
         omega_valid,
+        of_lines,
+        lines[0],
+        lines[1],
+        lines[2],
+        lines[3],
     )
     return following, (omega, omega_valid)
 
@@ -147,13 +171,14 @@ def patient_stimuli(rng, config):
     longest = (1 << config["TIME_W"]) - 1
     rows = _motion(rng, (0, 1, K_EDGE.hi, 7 << 10, 60 << 12), longest if longest < 5000 else 400)
     if longest < 5000:
-        still = {p.name: 0 for p in BLOCK.inputs} | {"k_edge": K_EDGE.hi, "reverse": 0}
+        still = {p.name: 0 for p in BLOCK.inputs} | {"k_edge": K_EDGE.hi, "reverse": 0, "whole_lines": 0}
         for rest in range(longest - TAKES - 4, longest + 3):
             rows += [still | {"step_up": 1}] * 2 + [still] * rest
             rows += [still | {"sample": 1}] + [still] * (TAKES + 1)
     for k_edge, gap in factors(rng):
         if gap <= longest:
             still = {p.name: 0 for p in BLOCK.inputs} | {"k_edge": k_edge, "reverse": int(rng.integers(2))}
+            still["whole_lines"] = 0
             turn = still | {("step_up", "step_down")[int(rng.integers(2))]: 1}
             rows += [turn] + [still] * gap + [turn] * int(rng.integers(1, 9))
             rows += [still | {"sample": 1}] + [still] * (TAKES + 1)
@@ -163,6 +188,7 @@ def patient_stimuli(rng, config):
 def _two_edges(rng, k_edge, apart, after=TAKES + 1):
     """A speed from two edges, in any direction, and clocks after its sample."""
     regs = {p.name: 0 for p in BLOCK.inputs} | {"k_edge": k_edge, "reverse": int(rng.integers(2))}
+    regs["whole_lines"] = 0
     turn = regs | {("step_up", "step_down")[int(rng.integers(2))]: 1}
     return [row for rest in (apart - 2, after) for row in [turn, regs | {"sample": 1}, *[regs] * rest]]
 
@@ -213,7 +239,7 @@ def _motion(rng, k_edges, rest):
     rows = []
 
     def run(clocks, **writes):
-        base = {"step_up": 0, "step_down": 0, "sample": 0, "reverse": 0, "k_edge": 60 << 12}
+        base = {"step_up": 0, "step_down": 0, "sample": 0, "reverse": 0, "k_edge": 60 << 12, "whole_lines": 0}
         rows.extend(base | writes for _ in range(clocks))
 
     def sample(**writes):
@@ -222,8 +248,8 @@ def _motion(rng, k_edges, rest):
 
     sample()
     for k_edge in k_edges:
-        for reverse in (0, 1):
-            regs = {"k_edge": k_edge, "reverse": reverse}
+        for reverse, lines in ((0, 0), (1, 0), (1, 1), (0, 1)):
+            regs = {"k_edge": k_edge, "reverse": reverse, "whole_lines": lines}
             for name in ("step_up", "step_down"):
                 for gap in (0, 1, 7, 60, 300):
                     for _ in range(max(2, 200 // (gap + 1))):
@@ -242,6 +268,15 @@ def _motion(rng, k_edges, rest):
     run(30, sample=1)
     run(3, step_up=1, step_down=1)
     sample()
+    for name in ("step_up", "step_down", "step_up"):  # uneven counts, samples without an edge between them
+        for k in range(60):
+            run(1, whole_lines=1, **{name: 1})
+            run((5, 90, 31, 62)[k % 4], whole_lines=1)
+            if k % 3 == 0:
+                sample(whole_lines=1)
+        sample(whole_lines=1)
+        run(rest, whole_lines=1)
+        sample(whole_lines=1)
     return rows
 
 
@@ -258,6 +293,7 @@ BLOCK = Block(
     registers=(
         Port("reverse", BIT, doc="1: code counts opposite to the phase order"),
         Port("k_edge", K_EDGE, doc="speed of one count a clock"),
+        Port("whole_lines", BIT, doc="1: over whole lines of four counts, which uneven counts do not disturb"),
     ),
     outputs=(
         Port("omega_me", PU, doc="electrical speed"),

@@ -55,7 +55,7 @@ def step(state, inputs, regs, position_bits):
         s.of_angle, s.step_up, s.step_down, s.skipped, s.theta_hall, x.sample_trigger, hall_angle.TIME_W
     )
     timer, (omega_me, omega_valid) = timer_step(
-        s.of_timer, s.step_up, s.step_down, x.sample_trigger, r.reverse, r.k_edge, TIME_W, MOVED_W
+        s.of_timer, s.step_up, s.step_down, x.sample_trigger, r.reverse, r.k_edge, 0, TIME_W, MOVED_W
     )
     code = theta >> (TURN_W - position_bits)
     following = State(filter_a, filter_b, filter_c, decoder, angle, timer, theta_hall, step_up, step_down, skipped)

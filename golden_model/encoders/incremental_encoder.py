@@ -85,7 +85,7 @@ def step(state, inputs, regs, position_bits):
         r.index_once,
     )
     timer, (omega_me, omega_valid) = timer_step(
-        s.of_timer, s.step_up, s.step_down, x.sample, r.reverse, r.k_edge, TIME_W, MOVED_W
+        s.of_timer, s.step_up, s.step_down, x.sample, r.reverse, r.k_edge, r.whole_lines, TIME_W, MOVED_W
     )
     following = State(
         filter_a,
@@ -127,7 +127,7 @@ def stimuli(rng, config):
     rows = []
     counts = 60
     regs = {"filter_clocks": 2, "index_phase": 1, "correct_max": 9, "index_once": 0, "reverse": 0, "k_edge": 900 << 12}
-    regs |= turn_counter.setting(counts, config["POSITION_BITS"])
+    regs |= turn_counter.setting(counts, config["POSITION_BITS"]) | {"whole_lines": 0}
     still = {p.name: 0 for p in BLOCK.inputs} | regs
 
     def show(place, clocks, **more):
@@ -145,6 +145,9 @@ def stimuli(rng, config):
         show(place, int(rng.integers(5, 9)))
     for place in [*range(40, 55), *range(59, 90), *range(90, 50, -1)]:
         show(place, 6)
+    still["whole_lines"] = 1
+    for place in [*range(50, 110), *range(110, 50, -1)]:
+        show(place, int(rng.integers(5, 20)))
     show(50, 1, clear_faults=1)
     show(50, 60)
     return rows
@@ -154,7 +157,7 @@ def patient_stimuli(rng, config):
     """Back and forth over the index while the shaft slips: losses of every size, at correct_max or far from it."""
     rows, slip = [], 0
     still = {p.name: 0 for p in BLOCK.inputs} | {"filter_clocks": 1, "index_phase": 1, "k_edge": 900 << 16}
-    still["index_once"] = 1
+    still |= {"index_once": 1, "whole_lines": 0}
     for turn in range(160):
         if turn % 40 == 0:
             counts = int(rng.integers(1000, 6000))
@@ -177,7 +180,7 @@ def _speeds(rng, config):
     """Each bit of k_edge at a speed that shows it; then as many illegal steps as a counter's bits need."""
     rows, place = [], 0
     still = {p.name: 0 for p in BLOCK.inputs} | turn_counter.setting(4000, config["POSITION_BITS"])
-    still |= {"filter_clocks": 1, "index_phase": 1, "correct_max": 9, "reverse": 0}
+    still |= {"filter_clocks": 1, "index_phase": 1, "correct_max": 9, "reverse": 0, "whole_lines": 0}
 
     def show(clocks, **more):
         a, b = quadrature_decoder.lines(place)
@@ -221,6 +224,7 @@ REGISTERS = tuple(
         "index_once",
         "reverse",
         "k_edge",
+        "whole_lines",
     )
 )
 Registers = namedtuple("Registers", [p.name for p in REGISTERS])

@@ -93,7 +93,7 @@ def step(state, inputs, regs, encoder, position_bits):
             incremental_encoder.Registers(
                 filter_clocks=r.filter_clocks, index_phase=r.index_phase, counts=r.counts, code_step=r.code_step,
                 code_rest=r.code_rest, correct_max=r.correct_max, index_once=r.index_once, reverse=x.reverse,
-                k_edge=r.k_edge,
+                k_edge=r.k_edge, whole_lines=r.whole_lines,
             ),
             position_bits,
         )  # fmt: skip
@@ -220,6 +220,7 @@ _INCREMENTAL = (
     "correct_max",
     "index_once",
     "k_edge",
+    "whole_lines",
 )
 _HALL = ("hall_reverse", "hall_offset", "start_first", "sector_counts")
 REGISTERS = (*(_PORTS[n] for n in (*_INCREMENTAL, *_HALL)), *serial_encoder.REGISTERS)

@@ -20,6 +20,11 @@ from golden_model.formats import BIT
 from golden_model.kernel import kernel
 
 FAULTS = Format(0, 7, 0)
+# Of bits 0 to 6, for those who show the flags.
+CONDITIONS = (
+    "current converter at its end", "bus reading at its end or low", "current model at its range", "merge at its range",
+    "delta_lambda at its range", "compensation at its limit", "estimate at its range",
+)  # fmt: skip
 
 
 class State(NamedTuple):

@@ -45,7 +45,7 @@ _SETTINGS = """
     514 correct_max      518 k_edge         51c hall_reverse      520 hall_offset      524 start_first
     528 sector_counts    52c half_period    530 encoder_bits      534 turn_bits        538 gray
     53c parity_on        540 crc_on         544 start_max         548 mode_command     54c two_errors
-    550 position_delay   554 bridge_max     558 index_once
+    550 position_delay   554 bridge_max     558 index_once       55c whole_lines
     560 clock_ratio      564 spi_bits       568 spi_skip          56c spi_delay        570 wait_clocks
     574 busy_timeout     578 two_words      57c use_convst        580 clock_idle       584 second_edge
     588 signed_code      58c channel_a      590 channel_b         594 channel_c        598 channel_u_dc

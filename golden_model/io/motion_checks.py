@@ -6,6 +6,8 @@
                    ``runaway_samples`` samples in sequence not slower than at the slowest of them
     2  stall       speed mode: i_q_ref at its limit and |omega_me| < omega_stall in ``stall_samples`` in sequence
 
+A bus that limits the braking current (``regen_limited``) lets the shaft coast: check 1 then waits with its count.
+
 Check 1: a reversal, a stop and a load step turn against the reference as well, but the drive brakes: the speed falls
 below its own minimum again and again, and each time the count starts anew.  With an angle, a direction or a phase order
 that is wrong the regulator accelerates instead.  A reference of zero is against either direction.  In torque mode the
@@ -36,8 +38,8 @@ class State(NamedTuple):
 
 @kernel
 def step(
-    state, omega_me, omega_ref, speed_mode, speed_limited, run, omega_trip, omega_away, runaway_samples, omega_stall,
-    stall_samples,
+    state, omega_me, omega_ref, speed_mode, speed_limited, regen_limited, run, omega_trip, omega_away,
+    runaway_samples, omega_stall, stall_samples,
 ):  # fmt: skip
     size = omega_me if omega_me >= 0 else -1 - omega_me
     coarse = size >> DROP_LIMIT
@@ -47,7 +49,8 @@ def step(
     leaving = run and speed_mode and against and coarse >= omega_away
     begins = state.away == 0 or size < state.slowest
     slowest = size if begins else state.slowest
-    away = (1 if begins else min(state.away + 1, AWAY_HI)) if leaving else 0
+    counted = state.away if regen_limited else min(state.away + 1, AWAY_HI)
+    away = (1 if begins else counted) if leaving else 0
     runaway = 1 if away > 0 and away >= runaway_samples else 0
 
     held = run and speed_mode and speed_limited and coarse < omega_stall
@@ -57,7 +60,7 @@ def step(
 
 
 USUAL = {"speed_mode": 1, "speed_limited": 0, "run": 1, "omega_trip": 300, "omega_away": 20, "runaway_samples": 5}
-USUAL |= {"omega_stall": 3, "stall_samples": 4, "omega_ref": 5000, "omega_me": 5000}
+USUAL |= {"omega_stall": 3, "stall_samples": 4, "omega_ref": 5000, "omega_me": 5000, "regen_limited": 0}
 
 
 def stimuli(rng, _config):
@@ -76,7 +79,7 @@ def stimuli(rng, _config):
                 wave = 400 if slope == 7 and k % 4 == 3 else 0
                 rows.append(usual | {"omega_me": -sign * (7000 + slope * k - wave), "omega_ref": 300 * sign})
             rows.append(usual)
-    for breaks in ({"run": 0}, {"speed_mode": 0}, {"omega_ref": -1}, {"speed_limited": 0}):
+    for breaks in ({"run": 0}, {"speed_mode": 0}, {"omega_ref": -1}, {"speed_limited": 0}, {"regen_limited": 1}):
         for row in ({"omega_me": -8000}, {"omega_me": 10, "speed_limited": 1}):
             rows += [usual | row] * 4 + [usual | row | breaks] + [usual | row] * 6 + [usual]
     for most in (0, 1, AWAY_HI):
@@ -112,6 +115,7 @@ BLOCK = Block(
         Port("omega_ref", PU, doc="speed reference"),
         Port("speed_mode", BIT, doc="1: speed control"),
         Port("speed_limited", BIT, doc="1: i_q_ref at its limit"),
+        Port("regen_limited", BIT, doc="1: the bus voltage limits the braking current"),
         Port("run", BIT, doc="1: gates are switching"),
     ),
     registers=(

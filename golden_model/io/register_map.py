@@ -111,11 +111,12 @@ _SETTINGS = """
     240 double_update
     250 use_table     254 k_flux         258 u_share      25c k_voltage      260 share_min    264 k_torque
     268 omega_learn   26c table_word     270 v_start        274 torque_step
+    23c regen_start   244 regen_slope     248 charge_samples
     340 residual_min  344 residual_w     348 residual_i     34c residual_samples
     350 residual_sum_max                 354 residual_sum_i
     378 residual_leg  37c residual_light
     380 residual_slow
-"""  # 23c, 244 to 24c, 278 to 33c, 384 to 3bc and 3f0 to 3fc are free
+"""  # 24c, 278 to 33c, 384 to 3bc and 3f0 to 3fc are free
 _COMMANDS = {
     "enable": (0x040, Kind.COMMAND),
     "clear_trip": (0x044, Kind.PULSE),
@@ -165,6 +166,7 @@ _FLAGS = {
     "delta_held": 13,
     "brake_asked": 14,
     "double_used": 15,
+    "regen_limited": 16,
     "motor_differs": 24,
 }
 # Bits of the word "ring_state", likewise

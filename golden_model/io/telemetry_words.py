@@ -108,14 +108,8 @@ if _MISSING:
 
 
 def owner(name: str) -> str:
-    """The instance of the top that calculates a field; the outputs of two Park transforms are renamed at the top."""
-    used = {"u_comp_d": "compensation_dq", "u_comp_q": "compensation_dq"}
-    used |= {"d_d": "direction_functions", "d_q": "direction_functions"}
-    if name in INPUTS:
-        return "latch"
-    if name in used:
-        return used[name]
-    return next(i for i, (m, _) in fluxproof.WIRING.items() if name in {p.name for p in m.BLOCK.outputs})
+    """The instance of the top that calculates a field."""
+    return "latch" if name in INPUTS else next(i for i in fluxproof.WIRING if name in fluxproof.outputs_of(i))
 
 
 def window(names) -> tuple[int, int]:

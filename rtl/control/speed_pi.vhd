@@ -2,7 +2,8 @@
 -- Purpose: speed regulator, from speed error to i_q reference, limited, with conditional integration.
 --   i_q_max is what current_limit leaves beside i_d
 --   err = omega_ref - omega_me;  u = speed_kp*err + integral;  i_q_ref = limit(u, +-i_q_max)
---   integral += speed_ki*err unless u is beyond the limit and err pushes further
+--   integral += speed_ki*err unless u is beyond the limit and err pushes further, or the bus voltage limited the braking
+--   current of the last sample (regen_limited) and err brakes
 -- Torque mode (speed_mode = 0): i_q_ref is i_q_ext, limited, and the integral follows it.
 -- run = 0: output and integral are zero.
 -- Formats: err PU, proportional part 28 fraction bits, integral S(1,28), output PU.
@@ -24,6 +25,7 @@ entity speed_pi is
     omega_me      : in  signed(PU_W - 1 downto 0);
     i_q_ext       : in  signed(PU_W - 1 downto 0);
     i_q_max       : in  signed(PU_W - 1 downto 0);
+    regen_limited : in  std_logic;
     speed_mode    : in  std_logic;
     run           : in  std_logic;
     speed_kp      : in  unsigned(KP_W - 1 downto 0);
@@ -74,6 +76,7 @@ begin
   process (clk)
     variable wanted : signed(PU_W - 1 downto 0);
     variable past   : std_logic;
+    variable brakes : std_logic;
     variable held   : std_logic;
   begin
     if rising_edge(clk) then
@@ -92,7 +95,9 @@ begin
       -- Stage 5: i_q_ref = asked, limited;  integral = moved, limited, unless held, or i_q_ref in torque mode
       wanted := resize(within(asked_4, unsigned(i_q_max), 0), PU_W);
       past   := beyond(asked_4, unsigned(i_q_max), 0);
-      held   := past and ((rises and not asked_4(TOTAL_W - 1)) or (falls and asked_4(TOTAL_W - 1)));
+      brakes := (rises and omega_me(PU_W - 1)) or (falls and not omega_me(PU_W - 1));
+      held   := (past and ((rises and not asked_4(TOTAL_W - 1)) or (falls and asked_4(TOTAL_W - 1))))
+                or (regen_limited and brakes);
       if valid(LATENCY - 1) = '1' then
         i_q_ref       <= wanted;
         speed_limited <= past;

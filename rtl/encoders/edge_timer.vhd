@@ -4,6 +4,8 @@
 -- The edges are the last one of this sample and the last one of the latest sample that had an edge, so there is no
 -- change-over.  Without an edge |omega_me| is at most k_edge / (clocks since the last edge).
 -- An edge after a reversal is the edge passed before, so it moves the shaft by no count.
+-- whole_lines = 1: over whole lines of four counts, by line_timer, which uneven counts do not disturb; the first line
+-- has no speed.
 -- Formats: k_edge U(20,12), counts MOVED_W bits and clocks TIME_W bits, both saturating, output PU.  A time beyond
 -- TIME_W bits is standstill.  Latency: 1 (every clock is a sample); sample to omega_valid LIMIT_AT + 2 clocks, one bit
 -- of the product or of the quotient a clock; a sample before that is ignored and its edges belong to the next.
@@ -17,8 +19,8 @@ use work.fluxproof_pkg.all;
 
 entity edge_timer is
   generic (
-    TIME_W  : positive range 4 to 24 := EDGE_TIMER_TIME_W;  -- at most MOVED_W + 13
-    MOVED_W : positive range 2 to 16 := EDGE_TIMER_MOVED_W
+    TIME_W  : positive range 4 to 24 := EDGE_TIMER_TIME_W;  -- at most MOVED_W + 11
+    MOVED_W : positive range 3 to 16 := EDGE_TIMER_MOVED_W
   );
   port (
     clk         : in  std_logic;
@@ -28,6 +30,7 @@ entity edge_timer is
     sample      : in  std_logic;
     reverse     : in  std_logic;
     k_edge      : in  unsigned(31 downto 0);
+    whole_lines : in  std_logic;
     omega_me    : out signed(PU_W - 1 downto 0);
     omega_valid : out std_logic
   );
@@ -36,6 +39,7 @@ end entity edge_timer;
 architecture rtl of edge_timer is
   constant QUOTIENT_W : positive := EDGE_TIMER_QUOTIENT_W;
   constant WORK_W     : positive := MOVED_W + 32 + 1;  -- twice the product
+  constant SPAN_W     : positive := TIME_W + LINE_TIMER_SPAN_MORE;
 
   -- Clocks of the engine: the product, a check for overflow, the quotient, its limit, the result
   constant DIVIDE_AT : positive := MOVED_W + 1;
@@ -63,7 +67,7 @@ architecture rtl of edge_timer is
   signal measured : std_logic;
   signal negative : std_logic;
   signal factor   : unsigned(MOVED_W - 1 downto 0);
-  signal divisor  : unsigned(TIME_W - 1 downto 0);
+  signal divisor  : unsigned(SPAN_W - 1 downto 0);
   signal product  : unsigned(WORK_W - 1 downto 0);  -- then remainder and bits still to be divided
   signal quotient : unsigned(QUOTIENT_W - 1 downto 0);
   signal past     : std_logic;  -- 1: the quotient is above its range
@@ -71,9 +75,18 @@ architecture rtl of edge_timer is
   signal edge : std_logic;
   signal take : std_logic;
   signal base : unsigned(TIME_W - 1 downto 0);
-  signal top  : unsigned(TIME_W downto 0);    -- remainder and the next bit
-  signal left : signed(TIME_W + 1 downto 0);  -- the same less the divisor
+  signal top  : unsigned(SPAN_W downto 0);    -- remainder and the next bit
+  signal left : signed(SPAN_W + 1 downto 0);  -- the same less the divisor
   signal size : unsigned(QUOTIENT_W downto 0);
+
+  -- Over whole lines: counts up to the next multiple of four
+  signal still      : std_logic;
+  signal counts     : unsigned(MOVED_W - 1 downto 0);
+  signal whole      : unsigned(MOVED_W - 1 downto 0);
+  signal line_span  : unsigned(SPAN_W - 1 downto 0);
+  signal line_known : std_logic;
+  signal next_span  : unsigned(SPAN_W - 1 downto 0);
+  signal next_known : std_logic;
 
   -- One clock more, up to the longest time
   function later (clocks : unsigned) return unsigned is
@@ -84,16 +97,26 @@ architecture rtl of edge_timer is
     return clocks + 1;
   end function;
 begin
-  assert TIME_W <= MOVED_W + 13
-    report "edge_timer: TIME_W must be at most MOVED_W + 13, the remainder has no more bits"
+  assert TIME_W <= MOVED_W + 11
+    report "edge_timer: TIME_W must be at most MOVED_W + 11, the remainder has no more bits"
     severity failure;
 
   edge <= step_up or step_down;
   take <= sample when clock = 0 else '0';
   base <= state.since when (take and state.edges) = '1' else state.elapsed;
-  top  <= product(TIME_W + QUOTIENT_W - 1 downto QUOTIENT_W - 1);
-  left <= signed('0' & top) - signed(resize(divisor, TIME_W + 2));
+  top  <= product(SPAN_W + QUOTIENT_W - 1 downto QUOTIENT_W - 1);
+  left <= signed('0' & top) - signed(resize(divisor, SPAN_W + 2));
   size <= shift_right(resize(quotient, QUOTIENT_W + 1) + 1, 1);
+
+  still  <= '1' when state.since = TIME_MAX else '0';
+  counts <= resize(magnitude(state.moved), MOVED_W);
+  whole  <= counts(MOVED_W - 1 downto 2) & "00" when counts(1 downto 0) = 0 or (and counts(MOVED_W - 1 downto 2)) = '1' else
+            (counts(MOVED_W - 1 downto 2) + 1) & "00";
+
+  lines : entity work.line_timer
+    generic map (TIME_W => TIME_W)
+    port map (clk => clk, rst => rst, step_up => step_up, step_down => step_down, take => take, still => still,
+              line_span => line_span, line_known => line_known, next_span => next_span, next_known => next_known);
 
   process (clk)
     variable moved : signed(MOVED_W downto 0);
@@ -128,10 +151,16 @@ begin
         measured <= state.edges;
         negative <= state.moved(MOVED_W) xor reverse;
         factor   <= to_unsigned(1, MOVED_W);
-        divisor  <= state.since;
-        if state.edges = '1' then
-          factor  <= resize(magnitude(state.moved), MOVED_W);
-          divisor <= state.span;
+        divisor  <= resize(state.since, SPAN_W);
+        if (state.edges and whole_lines) = '1' then
+          factor  <= whole and line_known;
+          divisor <= line_span;
+        elsif state.edges = '1' then
+          factor  <= counts;
+          divisor <= resize(state.span, SPAN_W);
+        elsif (whole_lines and next_known) = '1' then
+          factor  <= to_unsigned(4, MOVED_W);
+          divisor <= next_span;
         end if;
         if (state.edges = '1' and state.span = TIME_MAX) or (state.edges = '0' and state.since = TIME_MAX) then
           factor <= (others => '0');
@@ -154,10 +183,10 @@ begin
             product <= (others => '0');
           end if;
         elsif clock < LIMIT_AT then
-          quotient <= quotient(QUOTIENT_W - 2 downto 0) & not left(TIME_W + 1);
+          quotient <= quotient(QUOTIENT_W - 2 downto 0) & not left(SPAN_W + 1);
           product  <= resize(top & product(QUOTIENT_W - 2 downto 0) & '0', WORK_W);
-          if left(TIME_W + 1) = '0' then
-            product <= resize(unsigned(left(TIME_W downto 0)) & product(QUOTIENT_W - 2 downto 0) & '0', WORK_W);
+          if left(SPAN_W + 1) = '0' then
+            product <= resize(unsigned(left(SPAN_W downto 0)) & product(QUOTIENT_W - 2 downto 0) & '0', WORK_W);
           end if;
         elsif clock = LIMIT_AT then
           quotient <= size(QUOTIENT_W - 1 downto 0);

@@ -78,7 +78,7 @@ begin
 
   timer : entity work.edge_timer
     port map (clk => clk, rst => rst, step_up => step_up, step_down => step_down, sample => sample_trigger,
-              reverse => reverse, k_edge => k_edge,
+              reverse => reverse, k_edge => k_edge, whole_lines => '0',
               omega_me => omega_me, omega_valid => omega_valid);
 
 end architecture rtl;

@@ -32,6 +32,7 @@ entity incremental_encoder is
     index_once      : in  std_logic;
     reverse         : in  std_logic;
     k_edge          : in  unsigned(31 downto 0);
+    whole_lines     : in  std_logic;
     code_theta      : out unsigned(POSITION_BITS - 1 downto 0);
     omega_me        : out signed(PU_W - 1 downto 0);
     omega_valid     : out std_logic;
@@ -157,6 +158,7 @@ begin
       sample      => sample,
       reverse     => reverse,
       k_edge      => k_edge,
+      whole_lines => whole_lines,
       omega_me    => omega_me,
       omega_valid => omega_valid
     );

@@ -45,6 +45,7 @@ entity position_front is
     correct_max     : in  unsigned(11 downto 0);
     index_once      : in  std_logic;
     k_edge          : in  unsigned(31 downto 0);
+    whole_lines     : in  std_logic;
     hall_reverse    : in  std_logic;
     hall_offset     : in  unsigned(TURN_W - 1 downto 0);
     start_first     : in  unsigned(17 downto 0);
@@ -109,7 +110,7 @@ begin
                 start => start, start_count => start_count, clear_faults => clear_encoder,
                 filter_clocks => filter_clocks, index_phase => index_phase, counts => counts, code_step => code_step,
                 code_rest => code_rest, correct_max => correct_max, index_once => index_once, reverse => reverse,
-                k_edge => k_edge,
+                k_edge => k_edge, whole_lines => whole_lines,
                 code_theta => encoder_code, omega_me => omega_now, omega_valid => position_done, count => count,
                 forward => forward, referenced => referenced, moving => moving, index_count => index_count,
                 illegal_count => illegal_count, lost_counts => lost_counts, index_lost => index_lost,

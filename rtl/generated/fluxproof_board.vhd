@@ -154,6 +154,7 @@ architecture rtl of fluxproof_board is
   signal position_delay    : unsigned(17 downto 0);
   signal bridge_max        : unsigned(7 downto 0);
   signal index_once        : std_logic;
+  signal whole_lines       : std_logic;
   signal clock_ratio       : unsigned(4 downto 0);
   signal spi_bits          : unsigned(5 downto 0);
   signal spi_skip          : unsigned(4 downto 0);
@@ -387,6 +388,7 @@ begin
       position_delay    => position_delay,
       bridge_max        => bridge_max,
       index_once        => index_once,
+      whole_lines       => whole_lines,
       clock_ratio       => clock_ratio,
       spi_bits          => spi_bits,
       spi_skip          => spi_skip,
@@ -614,6 +616,7 @@ begin
       correct_max     => correct_max,
       index_once      => index_once,
       k_edge          => k_edge,
+      whole_lines     => whole_lines,
       hall_reverse    => hall_reverse,
       hall_offset     => hall_offset,
       start_first     => start_first,

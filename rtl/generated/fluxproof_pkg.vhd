@@ -91,6 +91,8 @@ package fluxproof_pkg is
     use_table        : std_logic;  -- 1: current references from torque_reference's table; i_q_ext is then a torque
     speed_kp         : unsigned(KP_W - 1 downto 0);  -- proportional gain
     speed_ki         : unsigned(KI_W - 1 downto 0);  -- integral gain times sample time
+    regen_start      : unsigned(DUTY_W - 1 downto 0);  -- bus voltage from which the braking current is limited
+    regen_slope      : unsigned(15 downto 0);  -- braking current that a bus above it takes away, per voltage; 0: no limit
     k_flux           : unsigned(KP_W - 1 downto 0);  -- 1 over the flux linkage of the table's last row
     u_share          : unsigned(U_MAX_W - 1 downto 0);  -- part of the voltage circle that the voltage loop aims at
     k_voltage        : unsigned(KI_W - 1 downto 0);  -- gain of the voltage loop per sample
@@ -168,6 +170,7 @@ package fluxproof_pkg is
     brake_off        : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage below which it is off
     watchdog         : unsigned(19 downto 0);  -- longest time without a sample, clocks
     heartbeat        : unsigned(15 downto 0);  -- longest time without a write, sample times; 0: no limit
+    charge_samples   : unsigned(9 downto 0);  -- sample times with all lower switches on before the drive switches; 0: none
     dead_time        : unsigned(11 downto 0);  -- both gates of a leg off, clocks
   end record settings_t;
 
@@ -186,6 +189,7 @@ package fluxproof_pkg is
     i_q                : signed(PU_W - 1 downto 0);  -- current, q axis
     i_q_ref            : signed(PU_W - 1 downto 0);  -- current reference, q axis
     speed_limited      : std_logic;  -- 1: output at its limit
+    regen_limited      : std_logic;  -- 1: the bus voltage limits the braking current
     lambda_d           : signed(PU_W - 1 downto 0);  -- flux linkage, d axis
     lambda_q           : signed(PU_W - 1 downto 0);  -- flux linkage, q axis
     omega_chord        : signed(PU_W - 1 downto 0);  -- electrical speed along the chord of a sample
@@ -412,6 +416,11 @@ package fluxproof_pkg is
   -- decoupling: 001, eq. (2), 'dq decoupling term' of Fig. 8
   constant DECOUPLING_LATENCY : positive := 2;
   constant DECOUPLING_DROP : natural := 16;
+
+  -- regeneration_limit: none: protection of the bus, docs/faults.md
+  constant REGENERATION_LIMIT_LATENCY : positive := 1;
+  constant REGENERATION_LIMIT_SLOPE_W : natural := 16;
+  constant REGENERATION_LIMIT_DROP : natural := 8;
 
   -- speed_pi: 001, section 5.3: speed regulator with limited current reference
   constant SPEED_PI_LATENCY : positive := 5;
@@ -1037,6 +1046,10 @@ package fluxproof_pkg is
   -- index_check: none: incremental encoder
   constant INDEX_CHECK_LATENCY : positive := 1;
 
+  -- line_timer: none: speed by the time over whole lines
+  constant LINE_TIMER_LATENCY : positive := 1;
+  constant LINE_TIMER_SPAN_MORE : natural := 2;
+
   -- position_bridge: none: absolute encoders
   constant POSITION_BRIDGE_LATENCY : positive := 1;
   constant POSITION_BRIDGE_DROP : natural := 16;
@@ -1283,6 +1296,10 @@ package fluxproof_pkg is
   constant U_DC_PROCESSING_SQRT3_2 : signed(17 downto 0) := to_signed(113512, 18);  -- 0.866025404 as U(0,17), signed for the multiplier
   constant U_DC_PROCESSING_DROP_BETA : natural := 17;
   constant U_DC_PROCESSING_INVERSE_W : natural := 22;
+
+  -- bootstrap_charge: none: supply of the upper gate drivers
+  constant BOOTSTRAP_CHARGE_LATENCY : positive := 1;
+  constant BOOTSTRAP_CHARGE_CHARGE_W : natural := 10;
 
   -- gate_generation: 001, section 5.2, IGBT pulse generation
   constant GATE_GENERATION_LATENCY : positive := 1;

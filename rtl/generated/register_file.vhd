@@ -591,9 +591,21 @@ begin
         settings.emf_l <= unsigned(held(23 downto 0));
         written(142)   <= '1';
       end if;
+      if (row(17) and column(7) and not sample_busy) = '1' then
+        settings.regen_start <= unsigned(held(16 downto 0));
+        written(143)         <= '1';
+      end if;
       if (row(18) and column(0) and not sample_busy) = '1' then
         settings.double_update <= held(0);
         written(144)           <= '1';
+      end if;
+      if (row(18) and column(1) and not sample_busy) = '1' then
+        settings.regen_slope <= unsigned(held(15 downto 0));
+        written(145)         <= '1';
+      end if;
+      if (row(18) and column(2) and not sample_busy) = '1' then
+        settings.charge_samples <= unsigned(held(9 downto 0));
+        written(146)            <= '1';
       end if;
       if (row(18) and column(4) and not sample_busy) = '1' then
         settings.use_table <= held(0);
@@ -797,7 +809,10 @@ begin
         settings.emf_w            <= (others => '0');
         settings.emf_samples      <= (others => '0');
         settings.emf_l            <= (others => '0');
+        settings.regen_start      <= (others => '0');
         settings.double_update    <= '0';
+        settings.regen_slope      <= (others => '0');
+        settings.charge_samples   <= (others => '0');
         settings.use_table        <= '0';
         settings.k_flux           <= (others => '0');
         settings.u_share          <= (others => '0');
@@ -976,9 +991,9 @@ begin
   shown(19 to 26)   <= (others => (others => '0'));
   shown(27)         <= std_logic_vector(resize(irq_clear, 32));
   shown(28 to 31)   <= (others => (others => '0'));
-  shown(32)         <= "0000000" & estimated.motor_differs & "00000000" & double_used & observed.brake_asked &
-                       estimated.delta_held & estimated.merge_known & estimated.temp_lost & estimated.psi_held &
-                       estimated.v_comp_limited & observed.speed_limited & observed.u_dc_low &
+  shown(32)         <= "0000000" & estimated.motor_differs & "0000000" & observed.regen_limited & double_used &
+                       observed.brake_asked & estimated.delta_held & estimated.merge_known & estimated.temp_lost &
+                       estimated.psi_held & estimated.v_comp_limited & observed.speed_limited & observed.u_dc_low &
                        observed.u_dc_at_rail & std_logic_vector(observed.current_at_rail) & setting_refused &
                        tripped & running;
   shown(33)         <= std_logic_vector(resize(estimated.flux_faults, 32));

@@ -5,7 +5,8 @@
 --                  sequence not slower than at the slowest of them
 --   2  stall       speed mode: i_q_ref at its limit and |omega_me| < omega_stall in stall_samples in sequence
 -- A reversal, a stop and a load step brake: the speed falls below its own minimum, and the count starts anew.
--- A reference of zero is against either direction.
+-- A reference of zero is against either direction.  While the bus voltage limits the braking current (regen_limited)
+-- the shaft coasts, and the count of a runaway waits.
 -- Formats: limits U(1,8), the minimum in full.
 -- Latency: 4.  Interval: 4.  Rounding: |omega_me| is the one's complement where it is negative, and cut (floor) to the
 -- limits' format: up to 1/256 late.  The counters saturate.
@@ -25,6 +26,7 @@ entity motion_checks is
     omega_ref       : in  signed(PU_W - 1 downto 0);
     speed_mode      : in  std_logic;
     speed_limited   : in  std_logic;
+    regen_limited   : in  std_logic;
     run             : in  std_logic;
     omega_trip      : in  unsigned(LIMIT_W - 1 downto 0);
     omega_away      : in  unsigned(LIMIT_W - 1 downto 0);
@@ -97,7 +99,7 @@ begin
           state.away <= (others => '0');
         elsif slower_2 = '1' then
           state.away <= to_unsigned(1, 12);
-        elsif (and state.away) = '0' then
+        elsif (and state.away) = '0' and regen_limited = '0' then
           state.away <= state.away + 1;
         end if;
         if held_2 = '0' then

@@ -25,7 +25,7 @@ entity protection is
     current_valid   : in  std_logic;
     dc_valid        : in  std_logic;
     omega_valid     : in  std_logic;
-    reference_valid : in  std_logic;
+    i_q_valid       : in  std_logic;
     voltage_valid   : in  std_logic;
     i_a             : in  signed(PU_W - 1 downto 0);
     i_b             : in  signed(PU_W - 1 downto 0);
@@ -40,6 +40,7 @@ entity protection is
     speed_mode      : in  std_logic;
     i_q_ref         : in  signed(PU_W - 1 downto 0);
     speed_limited   : in  std_logic;
+    regen_limited   : in  std_logic;
     u_d             : in  signed(PU_W - 1 downto 0);
     u_q             : in  signed(PU_W - 1 downto 0);
     u_comp_d        : in  signed(PU_W - 1 downto 0);
@@ -102,9 +103,9 @@ begin
               out_valid => open, current_offset => current_offset);
 
   motion : entity work.motion_checks
-    port map (clk => clk, rst => rst, in_valid => reference_valid,
+    port map (clk => clk, rst => rst, in_valid => i_q_valid,
               omega_me => omega_me, omega_ref => omega_ref, speed_mode => speed_mode, speed_limited => speed_limited,
-              run => run,
+              regen_limited => regen_limited, run => run,
               omega_trip => settings.omega_trip, omega_away => settings.omega_away,
               runaway_samples => settings.runaway_samples, omega_stall => settings.omega_stall,
               stall_samples => settings.stall_samples,

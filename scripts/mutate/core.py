@@ -59,6 +59,7 @@ LIMITS = {
     "omega_stall": "omega_me",
     "brake_on": "u_dc",
     "brake_off": "u_dc",
+    "regen_start": "u_dc",
 }
 HARMLESS = ("delta_max", "v_thr", "v_comp_max", "i_learn", "omega_psi_min")
 # What the estimators learn from a sample shows at once, down to its low bits.

@@ -81,8 +81,8 @@ PROOFS = (
         Fault(
             "enable held high",
             f"{CORE}.vhd",
-            "compare_c => o.compare_c, enable => enable,",
-            "compare_c => o.compare_c, enable => '1',",
+            "compare_c => compare_c, enable => enable,",
+            "compare_c => compare_c, enable => '1',",
         ),
     ),
 )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Properties of the current references: the circle of current_limit, and the regulator within its limit."""
+"""Properties of the current references: the circle of current_limit, the regulator within its limit, braking."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from scripts.prove.proof import Fault, Proof, committed
 
 LIMIT = "control/current_limit.vhd"
 SPEED = "control/speed_pi.vhd"
+REGENERATION = "control/regeneration_limit.vhd"
 
 
 def products(verilog: str) -> tuple[str, ...]:
@@ -48,5 +49,22 @@ PROOFS = (
         depth=3,
         assumed="nothing; the products may have any value",
         cut=products,
+    ),
+    Proof(
+        name="regeneration_brakes_less",
+        says="the bus voltage changes no current that drives; one that brakes keeps its direction and does not grow",
+        entity="regeneration_limit",
+        harness=committed("regeneration_limit.sv"),
+        faults=(
+            Fault("driving limited as well", REGENERATION,
+                  "(i_q_asked(PU_W - 1) xor omega_me(PU_W - 1)) and (or omega_me)", "or omega_me"),
+            Fault("the limit in place of the current", REGENERATION,
+                  "regen_limited <= past_0;\n        if past_0 = '1' then",
+                  "regen_limited <= past_0;\n        if braking_0 = '1' and i_q_asked < 0 then"
+                  "\n          i_q_ref <= -signed('0' & state.most);\n        elsif past_0 = '1' then"),
+        ),
+        method="induction",
+        depth=3,
+        search_depth=24,
     ),
 )  # fmt: skip

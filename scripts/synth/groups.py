@@ -44,6 +44,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "references",
         "table_current",
         "speed_regulator",
+        "regeneration",
         "current_regulators",
         "chord",
         "cross_coupling",
@@ -60,6 +61,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "bus_reciprocal",
         "modulator",
         "compare",
+        "charge",
         "gates",
     ),
     # paper 000: what dead time and drops take, its compensation, the magnets' flux

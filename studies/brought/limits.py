@@ -19,6 +19,7 @@ DRIVES = ("hub_36v", "servo_24v")
 OFF = {"healthy": {}, "r130": {"resistance_ohm": 1.3}, "psi90": {"magnet_flux_wb": 0.9}}
 WIND_UP = 1.25  # of the voltage that is there: what the regulator asks for
 TRIP = 0.6  # of the run
+POWER = 0.5  # of that of rated current at the highest EMF
 FAST = Ride(load=0.5)
 AT_LIMIT, GATES = r"limit|more than the (bus|inverter)|available", r"gates? (are|is|were) off|trip"
 
@@ -45,6 +46,18 @@ def _current_limit(name, off, rng) -> Made:
     return Made(columns, drive, Truth(tuple(causes), readings=AT_LIMIT))
 
 
+def _power_limit(name, off, rng) -> Made:
+    """A controller that takes no more than a battery may give; it turns its current down as the speed rises."""
+    drive = drive_of(name)
+    machine, causes = true_machine(drive, **OFF[off])
+    i, omega, _ = ride(machine, Ride(low=-0.1, high=1.2, load=1.2), rng)
+    emf, r = np.abs(omega * machine["magnet_flux_wb"]), machine["resistance_ohm"]
+    most = POWER * machine["rated_current_a"] * float(emf.max())
+    i = 1j * np.minimum(np.imag(i), (np.sqrt(emf**2 + 4.0 * r * most) - emf) / (2.0 * r))  # (emf + r i) i = most
+    columns = logged(i, omega, voltage(machine, i, omega), machine, drive["inverter"]["dc_bus_v"], Logger(), rng)
+    return Made(columns, drive, Truth(tuple(causes), readings=AT_LIMIT))
+
+
 def _trip(name, off, frozen, rng) -> Made:
     drive = drive_of(name)
     machine, causes = true_machine(drive, **OFF[off])
@@ -62,6 +75,7 @@ def cases() -> list:
     kinds = {
         "voltage_limit": _voltage_limit,
         "current_limit": _current_limit,
+        "power_limit": _power_limit,
         "trip": functools.partial(_trip, frozen=False),
         "trip_frozen": functools.partial(_trip, frozen=True),
     }

@@ -10,16 +10,18 @@ import importlib.util
 import json
 from pathlib import Path
 
-from studies.compare import joint, narmax, sparse
+from studies.compare import forward, joint, lasso, narmax, sparse
 
-METHODS = {"sindy": sparse, "narmax": narmax, "joint": joint}
+METHODS = {"sindy": sparse, "lasso": lasso, "narmax": narmax, "joint": joint, "forward": forward}
 TITLES = {
     "diagnose": "fluxproof diagnose",
     "sindy": "sparse regression (pySINDy, STLSQ)",
+    "lasso": "LASSO, penalty by BIC (scikit-learn)",
     "narmax": "NARMAX selection (SysIdentPy, FROLS)",
     "joint": "joint least squares (SciPy), 95 % intervals",
+    "forward": "forward selection by BIC over the catalogue's formulas",
 }
-PACKAGES = {"sindy": "pysindy", "narmax": "sysidentpy"}
+PACKAGES = {"sindy": "pysindy", "lasso": "sklearn", "narmax": "sysidentpy"}
 TUNED = Path(__file__).with_name("tuned.json")
 
 

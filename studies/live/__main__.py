@@ -2,7 +2,8 @@
 """`make live`: does `fluxproof watch` keep up with a running drive?  Writes build/studies/live.json.
 
 A server sends the packets of a closed loop of the golden core at 10 and 20 kHz; watch runs as a command, with its
-page.  A client of the page that never reads stands for a slow browser.  In the last run one bit of one packet is wrong.
+page.  A client of the page that never reads stands for a slow browser.  One run has a wrong bit in one packet.  Then
+the page is opened in a browser (page.py).
 
     python -m studies.live [--seconds 60]
 """
@@ -27,6 +28,8 @@ from fluxproof.files import write_json
 from golden_model import drive as drives
 from golden_model.io.telemetry_words import LAYOUT
 from golden_model.registers import registers
+from studies.live.browser import CHROMIUM
+from studies.live.page import told
 
 DRIVE_FILE = DRIVES / "paper001.toml"
 MOST_MB = 500.0
@@ -129,6 +132,11 @@ def main() -> int:
     note("one wrong bit: told", wanted if wanted in said else said, wanted, "", wanted in said)
     out = BUILD / "studies" / "live.json"
     out.parent.mkdir(parents=True, exist_ok=True)
+    if CHROMIUM is None:
+        print("no page in a browser: chromium is not installed (Debian package chromium)", file=sys.stderr)
+    else:
+        for figure in told(out.with_suffix(".png")):
+            note(*figure)
     write_json(out, figures)
     return 0 if all(f["pass"] for f in figures) else 1
 

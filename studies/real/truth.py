@@ -62,7 +62,9 @@ LATE = Truth(
     text="u_d = omega^2 psi 46 us: late voltage or angle, skew, or iron loss",
 )
 EMF = Truth(limit=r"(only )?one line(-to-line)? voltage|two of|second line", text="EMF, psi 5.805 of 5.8 mWb")
-TIMETABLE = Truth(limit=r"timetable|MATLAB (object|class|table)", text=f"{EMF.text}; a MATLAB timetable")
+TIMETABLE = Truth(
+    limit=r"'Dev1_ai0' may be terminal voltages", text=f"{EMF.text}; a MATLAB timetable whose column names no signal"
+)
 DYNO = r"u_q_ref.*not recorded|no (dq )?voltage|(first|lines?) .*(title|preamble|header)|units? .*(row|line) \d"
 FRAMELESS = Truth(
     (Cause(("magnet_flux",), {"magnet_flux_wb": (0.0059, 0.0066)}),), (Cause(("delay",)), Cause(("friction",))),

@@ -195,3 +195,68 @@ def test_references_beyond_the_limit_in_most_rows_have_another_unit(tmp_path, no
     table["u_q_ref"] = 1.2 * table["u_dc"] * np.ones(len(table["t"]))
     recording = load_recording(write(tmp_path / "r.parquet", table), nominal)
     assert "voltage_limit" not in codes(recording)
+
+
+def blind_above(columns, window, nominal):
+    """Currents of legs whose duty leaves no time to sample them are half of what they are."""
+    out, delay = dict(columns), nominal.control.duty_applied_after_samples
+    for x in "abc":
+        late = np.roll(columns[f"d_{x}"], delay) > window
+        out[f"i_{x}"] = np.where(late, 0.5 * columns[f"i_{x}"] + 1.0, columns[f"i_{x}"])
+    return out
+
+
+def test_currents_without_a_sampling_window_follow_from_the_other_two(tmp_path, nominal):
+    table = made(speed=1250.0)
+    highest = np.max([table[f"d_{x}"] for x in "abc"])
+    window = highest - 0.04
+    assert window > 0.8
+    recording = load_recording(write(tmp_path / "r.csv", blind_above(table, window, nominal)), nominal)
+    (found,) = [p for p in recording.problems if p.code == "shunt_window"]
+    assert float(found.message.split("above ")[1].split()[0]) == pytest.approx(window, abs=0.005)
+    for name in ("i_a", "i_b", "i_c"):
+        np.testing.assert_allclose(recording[name], table[name], atol=0.1)
+    assert codes(load_recording(write(tmp_path / "h.csv", table), nominal)) == []
+    offset = table | {"i_a": table["i_a"] + 0.3}  # a sum that is off at all duties is the sensor's
+    assert "shunt_window" not in codes(load_recording(write(tmp_path / "o.csv", offset), nominal))
+
+
+def ridden(n=2000, most_a=np.inf, most_w=np.inf):
+    """A log of 20 Hz with random throttle, which a limit of the current or the power cuts off."""
+    rng = np.random.default_rng(8)
+    t = np.arange(n) * 0.05
+    knots = np.arange(0.0, t[-1] + 4.0, 2.0)
+    omega = np.interp(t, knots, rng.uniform(50.0, 500.0, len(knots)))
+    i_q = np.minimum(np.interp(t, knots, rng.uniform(0.2, 6.0, len(knots))), most_a)
+    i_q = np.minimum(i_q, (np.sqrt((omega * PSI) ** 2 + 4 * R * most_w / 1.5) - omega * PSI) / (2 * R))
+    table = {"t": t, "i_d": 0 * t, "i_q": i_q, "omega_e": omega}
+    table |= {"u_d_ref": -omega * L_Q * i_q, "u_q_ref": R * i_q + omega * PSI, "u_dc": np.full(n, BUS)}
+    return {k: v if k in ("t", "u_dc") else v + 0.002 * np.abs(v).max() * rng.normal(size=n) for k, v in table.items()}
+
+
+@pytest.mark.parametrize("limit", [{"most_a": 4.0}, {"most_w": 250.0}, {}])
+def test_rows_at_a_limit_are_told_and_used(tmp_path, nominal, limit):
+    recording = load_recording(write(tmp_path / "r.csv", ridden(**limit)), nominal)
+    found = [p for p in recording.problems if p.code in ("current_limit", "power_limit")]
+    if not limit:
+        assert found == []
+        return
+    ((name, value),) = limit.items()
+    (problem,) = found
+    assert problem.code == {"most_a": "current_limit", "most_w": "power_limit"}[name] and problem.action == "rows used"
+    stated = float(problem.message.split("limit, ")[1].split()[0])
+    assert stated == pytest.approx(value, rel=0.02) and recording.usable.all()
+
+
+def test_the_highest_step_of_a_plan_is_no_limit(tmp_path, nominal):
+    locked = dq_made() | {"omega_e": np.zeros(2000)}
+    for name, table in {"r.csv": dq_made(), "locked.csv": locked}.items():
+        recording = load_recording(write(tmp_path / name, table), nominal)
+        assert not {"current_limit", "power_limit"} & set(codes(recording)), name
+
+
+def test_a_speed_in_counts_a_second_is_refused(tmp_path, nominal):
+    table = dq_made()
+    recording = load_recording(write(tmp_path / "r.csv", table | {"omega_e": 8192.0 * table["omega_e"]}), nominal)
+    assert [p.code for p in recording.problems if p.fatal] == ["speed_range"]
+    assert "such as counts a second" in recording.problems[-1].message

@@ -107,3 +107,16 @@ def test_references_without_noise_at_constant_speed_are_kept(tmp_path, nominal):
     table |= {"i_q": np.zeros(600), "u_d_ref": np.zeros(600), "u_q_ref": 0.165 * table["omega_e"]}
     recording = load_recording(write(tmp_path / "r.parquet", table), nominal)
     assert "gates_off" not in codes(recording) and recording.usable.all()
+
+
+def test_a_shaft_that_coasts_to_rest_after_a_trip(tmp_path, nominal):
+    """It stands for most of the time without commands, which hid that it had coasted."""
+    table = dq_made()
+    n, at = len(table["t"]), 1200
+    table["omega_e"] = np.where(np.arange(n) < at, table["omega_e"], 300.0 * np.exp(-(np.arange(n) - at) / 12.0))
+    for name in ("i_d", "i_q", "u_d_ref", "u_q_ref"):
+        table[name] = np.where(np.arange(n) < at, table[name], 0.0)
+    recording = load_recording(write(tmp_path / "r.csv", table), nominal)
+    (off,) = [p for p in recording.problems if p.code == "gates_off"]
+    assert off.row == at and f"from {table['t'][at]:g} s the gates are off" in off.message
+    assert not recording.usable[at:].any()

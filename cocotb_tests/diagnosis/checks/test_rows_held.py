@@ -60,3 +60,35 @@ def test_an_angle_that_is_sampled_in_step_with_the_rotor_is_no_hall_angle(tmp_pa
     theta = np.arange(4000) * 2 * np.pi / 10
     recording = load_recording(write(tmp_path / "r.parquet", table | {"theta_e": theta % (2 * np.pi)}), nominal)
     assert "hall_steps" not in codes(recording)
+
+
+def oversampled(table, times, first=0):
+    """A scope's rows: commands as steps, currents with the ripple of the PWM between the samples of the control."""
+    n = len(table["t"])
+    fine, coarse = np.arange(n * times) / times, np.arange(n)
+    out = {"t": fine * T}
+    for name, values in table.items():
+        if name.startswith("d_"):
+            out[name] = np.repeat(values, times)
+        elif name != "t":
+            between = np.interp(fine, coarse, np.unwrap(values) if name == "theta_e" else values)
+            out[name] = between + (0.3 * np.sin(2 * np.pi * fine) if name.startswith("i_") else 0.0)
+    return {name: values[first:] for name, values in out.items()}
+
+
+@pytest.mark.parametrize("first", [0, 3])
+def test_of_several_rows_a_period_that_of_the_control_is_kept(tmp_path, nominal, first):
+    table = made()
+    recording = load_recording(write(tmp_path / "r.parquet", oversampled(table, 8, first)), nominal)
+    assert codes(recording) == ["oversampled"] and recording.joined[:-1].all() and not recording.slow
+    kept = len(recording)
+    assert kept == 4000 - (first > 0)
+    np.testing.assert_allclose(recording["i_a"], table["i_a"][-kept:], atol=1e-9)
+
+
+def test_several_rows_a_period_without_a_rhythm_are_refused(tmp_path, nominal):
+    table = oversampled(made(), 8)
+    for name in ("d_a", "d_b", "d_c"):
+        table[name] = np.interp(np.arange(32000), np.arange(0, 32000, 8), table[name][::8])
+    recording = load_recording(write(tmp_path / "r.parquet", table), nominal)
+    assert recording.fatal and "keep those at which the current was sampled" in recording.problems[0].message

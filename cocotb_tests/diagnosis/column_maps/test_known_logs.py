@@ -40,6 +40,14 @@ LOGS = {
         f" odrv0.axis0.encoder.vel_estimate=omega_e*{1 / 8 / np.pi}",
         {},
     ),
+    "pyvesc": (
+        "time=t avg_id=i_d avg_iq=i_q avg_vd=u_d_ref avg_vq=u_q_ref rpm=omega_e*9.549296585513721 v_in=u_dc",
+        {"avg_motor_current": 3.0, "temp_fet": 40.0},
+    ),
+    "SimpleFOC monitor": (
+        "Time=t voltageQ=u_q_ref voltageD=u_d_ref currentQ=i_q*1000 currentD=i_d*1000 velocity=omega_e*0.25",
+        {"target": 5.0, "angle": 1.0},
+    ),
     "Kaggle electric motor temperature": (
         f"u_q=u_q_ref u_d=u_d_ref motor_speed=omega_e*{60 / 8 / np.pi} i_d=i_d i_q=i_q",
         {"coolant": 20.0, "stator_winding": 60.0, "pm": 50.0, "profile_id": 17},
@@ -102,3 +110,18 @@ def test_the_inverter_data_set_is_refused_with_its_reason(tmp_path, nominal):
     )
     with pytest.raises(RecordingError, match="missing the angle theta_e.*induction motor"):
         load_recording(write(tmp_path / "r.csv", {name: np.arange(500.0) for name in names}), nominal)
+
+
+@pytest.mark.parametrize("column", ["torque", "TORQUE", "servo_stats.torque_Nm"])
+def test_a_torque_that_a_controller_computes_is_not_one_of_the_shaft(tmp_path, nominal, column):
+    """It would confirm the torque constant from which it was computed."""
+    table = dq_made()
+    names = {"t": "time", "i_d": "D_CURRENT", "i_q": "Q_CURRENT", "u_d_ref": "VOLTAGE_DQ_D", "u_q_ref": "VOLTAGE_DQ_Q"}
+    log = {names[name]: table[name] for name in names} | {"VELOCITY": table["omega_e"] / 8 / np.pi}
+    if column.startswith("servo"):
+        log = {"time": table["t"], "servo_stats.d_A": table["i_d"], "servo_stats.q_A": table["i_q"],
+               "servo_control.d_V": table["u_d_ref"], "servo_control.q_V": table["u_q_ref"],
+               "servo_stats.velocity": table["omega_e"] / 8 / np.pi}  # fmt: skip
+    recording = load_recording(write(tmp_path / "log.csv", log | {column: 0.2 * table["i_q"]}), nominal)
+    assert "torque" not in recording.columns
+    assert any("the controller computes it" in note for note in recording.meta["notes"])

@@ -14,6 +14,7 @@ from fluxproof.diagnosis.conventions.apply import edit
 from fluxproof.diagnosis.conventions.table import READINGS
 from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
 from fluxproof.diagnosis.improve.improve import _set
+from fluxproof.diagnosis.ingest.entries import entries_of
 from fluxproof.diagnosis.ingest.units import OF_BUS
 from fluxproof.diagnosis.ingest.usual_names import NAMES, TOLD_BY_UNIT, usual
 from fluxproof.diagnosis.loading.load import load_recording
@@ -69,6 +70,15 @@ def test_wrong_columns_name_the_entry(tmp_path, lines):
     assert "[columns]" in message and "\n" not in message
     for word in WRONG_COLUMNS[lines]:
         assert word in message
+
+
+def test_an_option_names_a_column(tmp_path):
+    assert entries_of(["Dev1_ai0=u_ab", "n = omega_e [rpm]", "a=b=i_q", "Spare="]) == {
+        "Dev1_ai0": "u_ab", "n": {"name": "omega_e", "unit": "rpm"}, "a=b": "i_q", "Spare": "",
+    }  # fmt: skip
+    for text in ("u_ab", "Dev1_ai0=u_xy", "=u_ab"):
+        with pytest.raises(RecordingError, match="--column .* expected NAME=CANONICAL"):
+            entries_of([text])
 
 
 def test_files_of_several_loggers_share_the_columns(tmp_path):
@@ -136,6 +146,41 @@ def test_names_that_may_mean_something_else_need_their_unit():
     assert usual("speed", "rpm")[:2] == ("omega_e", "rpm")  # by a line of units
     assert usual("U_V", "")[0] == "u_b" and usual("u_uv [V]", "")[0] == "u_ab"  # phase V; line U-V
     assert usual("I_A", "")[:2] == ("i_a", "")  # not a current in amperes
+
+
+IN_WORDS = {  # a header: canonical column and unit
+    "rpm": ("omega_e", "rpm"), "Motor Speed / rpm": ("omega_e", "rpm"), "n/min-1": ("omega_e", "min-1"),
+    "Electrical speed (rpm)": ("omega_e", "erpm"), "Output Speed (rad/s)": ("omega_e", "rad/s mech"),
+    "T measured (Nm)": ("torque", "Nm"), "Output Torque, N.mm": ("torque", "N.mm"),
+    "Test motor q-axis current": ("i_q", ""), "QAxisCurrent [A]": ("i_q", "A"), "I_d/A": ("i_d", "A"),
+    "Iq setpoint motor (A)": ("i_q_ref", "A"), "q-axis voltage reference (V)": ("u_q_ref", "V"),
+    "Motor phase current A": ("i_a", ""), "phase current C (A)": ("i_c", "A"), "Duty cycle phase U [%]": ("d_a", "%"),
+    "bus v (V) at drive": ("u_dc", "V"), "DC Link Voltage [V]": ("u_dc", "V"),
+    "Test Motor Temperature (Deg C)": ("temp_winding", "Deg C"),
+}  # fmt: skip
+OF_OTHERS = (
+    "Absorber q-axis current", "Test motor FET temp (C)", "Motor drive temperature (C)", "Output Speed set-point (rpm)",
+    "Motor ID", "motor speed (rad/s)", "shaft electrical speed (rad/s)", "bus i DC (A)", "battery current (A)",
+    "motor phase-phase voltage (V) rms", "brake (V)", "Output Torque", "Motor current (A)",
+)  # fmt: skip
+
+
+def test_names_in_words_are_told_by_every_word():
+    for column, expected in IN_WORDS.items():
+        assert (usual(column, "") or ())[:2] == expected, column
+    assert [column for column in OF_OTHERS if usual(column, "")] == []
+    assert usual("Output Torque", "N.mm")[:2] == ("torque", "N.mm")  # by a line of units
+
+
+def test_two_names_in_words_of_one_quantity(tmp_path, nominal):
+    table = dq_made(400)
+    twice = table | {"Stator temperature (C)": np.full(400, 30.0), "Winding temperature (C)": np.full(400, 31.0)}
+    recording = load_recording(write(tmp_path / "r.csv", twice), nominal)
+    assert "temp_winding" not in recording.columns
+    assert any("could both be temp_winding: none is used" in note for note in recording.meta["notes"])
+    speeds = {k: v for k, v in table.items() if k != "omega_e"} | dict.fromkeys(("Shaft rpm", "Motor rpm"), 9.0)
+    with pytest.raises(RecordingError, match="'Motor rpm' and 'Shaft rpm' could both be omega_e"):
+        load_recording(write(tmp_path / "s.csv", speeds), nominal)
 
 
 def test_no_name_is_usual_for_two_columns():
@@ -256,7 +301,7 @@ def test_a_speed_without_a_unit_is_proposed_with_one(tmp_path, nominal):
 
 
 def test_a_dyno_sheet_is_told_what_its_missing_voltages_would_add(tmp_path):
-    (tmp_path / "dyno.csv").write_text("rpm,iq (A),T measured (Nm),bus (A)\n" + "100,1.5,0.2,0.1\n" * 8)
+    (tmp_path / "dyno.csv").write_text("rpm,i (A),T measured (Nm),bus (A)\n" + "100,1.5,0.2,0.1\n" * 8)
     with pytest.raises(RecordingError, match=r"torque, i_q and omega_e \(a dyno sheet\) give flux and friction"):
         load_recording(tmp_path / "dyno.csv", nominal_of(tmp_path))
 
@@ -267,6 +312,8 @@ REFUSED = {
     "no voltages": ("t i_d i_q omega_e", "u_q_ref alone would show R and flux.*dyno sheet"),
     "one axis": ("t i_q u_d_ref u_q_ref omega_e", "i_d would show L_d and the angle"),
     "no speed": ("t i_d i_q u_d_ref u_q_ref", "omega_e would show steady effects"),
+    "instrument": ("t Dev1_ai0", "'Dev1_ai0' may be terminal voltages.*--column 'Dev1_ai0=u_ab'"),
+    "two probes": ("t ai0 ai1", "--column 'ai0=u_ab' --column 'ai1=u_bc'"),
     "supply": ("t i_dc u_dc", "supply alone show nothing.*EMF run"),
 }
 

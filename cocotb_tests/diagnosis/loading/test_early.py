@@ -11,6 +11,7 @@ import pytest
 
 from cocotb_tests.support.recordings.from_equations import dq_made, made, nominal_of, write
 from fluxproof.checkout import ROOT
+from fluxproof.command import main
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.loading.early import refuse_early
 from fluxproof.diagnosis.loading.load import load_recording
@@ -63,6 +64,15 @@ def test_the_message_of_a_wrong_entry(columns, tmp_path):
     with pytest.raises(RecordingError) as late:
         load_recording(path, nominal)
     assert refused(path, nominal) == str(late.value)
+
+
+def test_columns_of_the_command_line_count(tmp_path, capsys):
+    table = dq_made()
+    nominal, path = nominal_of(tmp_path), write(tmp_path / "r.csv", {"shout": table.pop("i_q"), **table})
+    refuse_early([path], nominal.path, {"shout": "i_q"})
+    named = ["--column", "shout=i_q", "--column", "whisper=u_dc"]
+    assert main(["diagnose", str(path), "--drive", str(nominal.path), *named]) == 2
+    assert "'whisper' is not a column of" in capsys.readouterr().err
 
 
 def test_what_a_diagnosis_can_use_or_judges_itself_passes(tmp_path):

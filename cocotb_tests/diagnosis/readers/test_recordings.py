@@ -16,6 +16,7 @@ from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
 from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.readers import read_table
+from fluxproof.diagnosis.readers.grids import flat
 
 
 @pytest.fixture(scope="module")
@@ -220,3 +221,42 @@ def test_a_million_rows_in_time(tmp_path, nominal):
     print(seconds)
     # Twice what was measured on one core, for slower ones.
     assert seconds["csv"] < 12 and seconds["parquet"] < 2 and seconds["all"] < 8
+
+
+AXES_OF = {  # how a file holds the axes of its matrices, and how many speeds it has beside four currents
+    "vectors": (lambda omega, i_q: (omega, i_q), 6),
+    "matrices": (lambda omega, i_q: np.meshgrid(omega, i_q, indexing="ij"), 6),
+    "square": (lambda omega, i_q: np.meshgrid(omega, i_q, indexing="ij"), 4),
+}
+
+
+@pytest.mark.parametrize("axes", AXES_OF)
+def test_matrices_over_speed_and_current_are_a_table(tmp_path, nominal, axes):
+    from scipy.io import savemat
+
+    shape, speeds = AXES_OF[axes]
+    omega, i_q = np.linspace(50.0, 500.0, speeds), np.array([0.0, 1.0, 2.5, 4.0])
+    grid = np.meshgrid(omega, i_q, indexing="ij")
+    u_q, u_d = 1.5 * grid[1] + 0.165 * grid[0], -0.016 * grid[0] * grid[1]
+    held = dict(zip(("omega_e", "i_q"), shape(omega, i_q), strict=True))
+    savemat(tmp_path / "m.mat", held | {"u_q_ref": u_q, "u_d_ref": u_d, "i_d": 0.0 * u_q})
+    recording = load_recording(tmp_path / "m.mat", nominal)
+    assert recording.points and len(recording) == 4 * speeds
+    for name, values in {"omega_e": grid[0], "i_q": grid[1], "u_q_ref": u_q}.items():
+        np.testing.assert_allclose(recording[name], values.ravel())
+
+
+def test_square_matrices_with_vectors_do_not_tell_their_axes(tmp_path, nominal):
+    from scipy.io import savemat
+
+    square = np.ones((4, 4))
+    savemat(
+        tmp_path / "m.mat", {"omega_e": np.arange(4.0), "i_q": np.arange(4.0), "u_q_ref": square, "u_d_ref": square}
+    )
+    with pytest.raises(RecordingError, match="both axes as matrices too"):
+        load_recording(tmp_path / "m.mat", nominal)
+
+
+def test_phases_in_one_array_are_no_matrix_over_two_axes():
+    found = flat({"t": np.arange(50.0), "i": np.ones((50, 3)), "d": np.ones((50, 3))})
+    assert list(found) == ["t", "i[0]", "i[1]", "i[2]", "d[0]", "d[1]", "d[2]"]

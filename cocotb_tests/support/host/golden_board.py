@@ -53,6 +53,6 @@ class GoldenBoard(Board):
         gates, r = self.periods.core.state.of_gate_generation, self.periods.core.registers
         good = 0 < r.dead_time < r.min_pulse <= self.generics["carrier_half"]
         shown = self.periods.core.observed._asdict() | dict(zip(FLAGS, self.flags, strict=True))
-        shown |= {"running": gates.running, "tripped": gates.tripped, "min_pulse_used": gates.min_pulse}
+        shown |= {"running": self.periods.core.running, "tripped": gates.tripped, "min_pulse_used": gates.min_pulse}
         shown |= {"setting_refused": int(not good), "double_used": gates.double_update}
         self.registers.status |= {name: shown[name] for name in self.registers.status if name in shown}

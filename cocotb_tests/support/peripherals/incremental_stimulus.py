@@ -47,6 +47,7 @@ def incremental(seed: int, clocks: int) -> Iterator[tuple[dict[str, int], dict[s
             "reverse": int(rng.integers(2)),
             "index_once": int(rng.integers(4) > 0),
             "k_edge": int(rng.integers(1 << 32)),
+            "whole_lines": int(rng.integers(2)),
         }
         spacing = int(rng.choice([30, 60, 500]))
         once = {"sample": spacing, "start": clocks // 3, "clear_faults": clocks // 4}

@@ -114,7 +114,7 @@ def _by_commands(recording, no_current) -> np.ndarray:
         rows = slice(a, a + n)
         if np.mean(no_current[rows]) < 0.5 or turned[a + n - 1] - turned[a] < LEAST_TURN:
             continue
-        if np.median(speed[rows]) < slow:
+        if np.count_nonzero(speed[rows] > slow) < LEAST_SLOW:  # a shaft that coasts to rest turns only at first
             continue
         # References of the dq frame are constant at constant speed, if nothing is noisy.
         still = names[0] == "u_d_ref" and any(recording[c][a] != 0.0 for c in names)

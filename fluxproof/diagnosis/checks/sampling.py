@@ -58,6 +58,8 @@ def check(recording, nominal) -> None:
         )
     elif not _time_is_wrong(recording, ratio, period):
         message = f"a row every {usual:g} s, but [control] sample_time_s or 1 / pwm_frequency_hz is {period:g} s"
+        if ratio < 1.0 / SLOW_FROM:
+            message += ": of several rows a period, keep those at which the current was sampled for the control"
         recording.problems.append(Problem("sample_time", message, "t", 0, len(recording), fatal=True))
         return
     else:

@@ -25,6 +25,6 @@ COLUMNS = {
     "velocity": ("omega_e", "turn/s mech"),
     "bus_v": ("u_dc", "V"),
     "motor_temp_c": ("temp_winding", "degC"),
-    "torque_nm": ("torque", "Nm"),
 }
+IGNORED = {"torque": "the controller computes it from i_q", "torque_nm": "the controller computes it from i_q"}
 NOTES = ["moteus: velocity is that of the output shaft; with a gear the electrical speed is higher by its ratio"]

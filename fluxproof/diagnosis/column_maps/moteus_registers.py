@@ -23,6 +23,6 @@ COLUMNS = {
     "velocity": ("omega_e", "turn/s mech"),
     "voltage": ("u_dc", "V"),
     "motor_temperature": ("temp_winding", "degC"),
-    "torque": ("torque", "Nm"),
 }
+IGNORED = {"torque": "the controller computes it from i_q"}
 NOTES = ["moteus: velocity is that of the output shaft; with a gear the electrical speed is higher by its ratio"]

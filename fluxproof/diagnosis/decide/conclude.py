@@ -13,6 +13,7 @@ from fluxproof.diagnosis.decide.off_orders import Stray
 from fluxproof.diagnosis.decide.rules import Judgement, judge
 from fluxproof.diagnosis.decide.sizes import Sizes, fit_of, left_by, measured_torque, with_stray
 from fluxproof.diagnosis.decide.unknown_term import sparse_term
+from fluxproof.diagnosis.ground.quantities import measured
 from fluxproof.diagnosis.ground.result import Fit, NamedEffect, Remainder, UnknownTerm
 from fluxproof.diagnosis.inference.fitted_set import covariance_of
 
@@ -146,6 +147,7 @@ def _described(j: Judgement, name, held) -> UnknownTerm:
     least = Sizes(setup, setup.cells.y, best.left(), held, True).channels[channel].left
     before = j.unseen.channels[channel].left
     share = float(np.clip(1.0 - least / before, 0.0, 1.0)) if before > 0.0 else 0.0
-    parameter, e = next(iter(effect.estimates(best.c[name], covariance_of(best, name, best.cov), None).items()))
-    formula = f"{parameter}, {effect.equation}"
+    (parameter, e), *others = effect.estimates(best.c[name], covariance_of(best, name, best.cov), None).items()
+    sizes = "".join(f"; {other} {measured(x.value, x.sigma, x.unit)}" for other, x in others)
+    formula = f"{parameter}, {effect.equation}{sizes}"
     return UnknownTerm("u_dq", formula, e.value, e.sigma, e.unit, share, effect.clause)

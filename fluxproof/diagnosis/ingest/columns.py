@@ -33,11 +33,13 @@ from fluxproof.diagnosis.ingest.demand import LINE_VOLTAGES, PHASE_VOLTAGES, is_
 from fluxproof.diagnosis.ingest.entries import entry_of, nearest
 from fluxproof.diagnosis.ingest.stated import constants_of
 from fluxproof.diagnosis.ingest.units import COMMANDED, OF_BUS, conversion, known_units, split_unit
-from fluxproof.diagnosis.ingest.usual_names import TOLD, usual
+from fluxproof.diagnosis.ingest.usual_names import usual
+from fluxproof.diagnosis.ingest.words import LATER, is_speed
 from fluxproof.diagnosis.ingest.worth import worth
 from fluxproof.diagnosis.readers.table import Table, shown
 
 MOST_GUESSES = 6
+OF_SHAFT = ("omega_e", "torque")
 WORTH_NAMING = ("torque", "temp_winding", "omega_e", "u_dc")  # which a diagnosis does without if they are not found
 
 
@@ -201,19 +203,34 @@ def _ready_made(plan, left, nominal, path) -> bool:
                 best, hits = known, fits
     if best is None or not hits:
         return False
+    _ignore(plan, best, left)
     for key, columns in hits.items():
         name, unit = best.COLUMNS[key]
         if len(columns) > 1:
             raise _doubtful(path, columns, name)
         if name not in plan.sources:
             where = f"{path}: column {shown(columns[0])!r}"
-            plan.sources[name] = _source(columns[0], name, _unit_of(columns[0], left) or unit, nominal, where)
+            stated = _unit_of(columns[0], left)
+            if key in getattr(best, "SHAFT", ()) and conversion(name, f"{stated} mech", 1) is not None:
+                stated += " mech"
+            plan.sources[name] = _source(columns[0], name, stated or unit, nominal, where)
     plan.used = f"{plan.used}, {best.NAME}" if plan.used == "[columns]" else best.NAME
     plan.notes += [f"column names as in {best.NAME}", *getattr(best, "NOTES", [])]
     plan.assumed |= {k: v for k, v in getattr(best, "ASSUMED", {}).items() if k not in plan.sources}
     plan.sample_time_s = getattr(best, "SAMPLE_TIME_S", None)
     plan.run = next((c for c in left if c == getattr(best, "RUN", None)), None)
     return True
+
+
+def _ignore(plan, known, left) -> None:
+    """Leave out what has a canonical name and is something else in a known log."""
+    key = getattr(known, "KEY", plain)
+    for column in left:
+        why = getattr(known, "IGNORED", {}).get(key(split_unit(column)[0]))
+        for name in [name for name, source in plan.sources.items() if why and source.column == column]:
+            del plan.sources[name]
+        if why:
+            plan.notes.append(f"{known.NAME}: column {shown(column)!r} is not used: {why}")
 
 
 def _usual_names(plan, left, nominal, path) -> None:
@@ -223,15 +240,24 @@ def _usual_names(plan, left, nominal, path) -> None:
         named = usual(column, left[column].strip())
         if named and named[0] not in plan.sources:
             found.setdefault(named[0], []).append((named[2], column, named[1]))
+    doubts = {}
     for name, candidates in found.items():
         (rank, column, unit), *others = sorted(candidates)
         if others and others[0][0] == rank:
-            raise _doubtful(path, [column, others[0][1]], name)
+            doubts[name] = _doubtful(path, [column, others[0][1]], name)
+            if rank < LATER:
+                raise doubts[name]
+            plan.notes.append(f"{shown(column)!r} and {shown(others[0][1])!r} could both be {name}: none is used")
+            continue
         source = _source(column, name, unit or COLUMNS[name], nominal, f"{path}: column {shown(column)!r}")
         plan.sources[name] = dataclasses.replace(source, by_name=not unit)
-    if found:
-        read = ", ".join(f"{name} from {shown(plan.sources[name].column)!r}" for name in found)
-        plan.notes.append(f"columns read by their usual names: {read}; override them in [columns]")
+    if doubts and missing_columns(set(plan.sources) | set(plan.assumed) | set(constants_of(nominal))):
+        raise next(iter(doubts.values()))
+    if read := [name for name in found if name not in doubts]:
+        text = ", ".join(f"{name} from {shown(plan.sources[name].column)!r}" for name in read)
+        plan.notes.append(f"columns read by their usual names: {text}; override them in [columns]")
+    if any(re.search(r"\boutput\b", plan.sources[name].column, re.I) for name in read if name in OF_SHAFT):
+        plan.notes.append("torque and speed of the output are taken as the motor's: with a gear, divide by its ratio")
 
 
 def _doubtful(path, columns, name) -> RecordingError:
@@ -248,8 +274,9 @@ def _demand(plan, names, path) -> None:
         why = f" ({plan.notes[-1]})" if plan.notes else ""
         raise RecordingError(
             f"{path}: missing {' and '.join(missing)}; found columns {found or 'none'}{_guesses(missing, names)}; "
-            f"name them in [columns] of drive.toml, or give a value that was constant in [constants]{why}"
-            f"{worth(missing, names, set(plan.sources) | set(plan.assumed))}"
+            f"name them by --column NAME=... or in [columns] of drive.toml, or give a value that was constant in "
+            f"[constants]{why}"
+            f"{worth(missing, names, set(plan.sources) | set(plan.assumed), plan.wanted())}"
         )
 
 
@@ -282,8 +309,7 @@ def _nearly_usual(names) -> dict[str, str]:
     """{canonical name: column} of usual names that count only with a unit, such as "n", or lack a number: "vd1"."""
     out: dict[str, str] = {}
     for name in names:
-        bare = split_unit(name)[0].strip().lower()
-        if bare in TOLD and TOLD[bare][0] == "omega_e":
+        if is_speed(name):
             out.setdefault("omega_e", name)
         found = re.fullmatch(r"(.*[^\d_])_?\d", split_unit(name)[0])
         known = usual(found.group(1), "") if found else None

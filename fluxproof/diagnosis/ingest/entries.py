@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One entry of [columns] of a drive.toml, checked."""
+"""One entry of [columns] of a drive.toml, checked, or of the option --column that adds one."""
 
 from __future__ import annotations
 
 import difflib
 
 from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
+from fluxproof.diagnosis.ingest.units import split_unit
 from fluxproof.quote import shown
 from golden_model.drive_keys import is_finite
 
@@ -33,6 +34,20 @@ def entry_of(key, value, nominal) -> dict:
     if not isinstance(entry.get("unit", ""), str) or ("unit" in entry and ("factor" in entry or "offset" in entry)):
         raise RecordingError(f"{where}: give either unit, as a string, or factor and offset")
     return entry
+
+
+def entries_of(options) -> dict:
+    """Entries of [columns] of the texts "NAME=CANONICAL" or "NAME=CANONICAL [UNIT]" of --column."""
+    out = {}
+    for text in options or ():
+        key, _, told = (part.strip() for part in text.rpartition("="))
+        name, unit = split_unit(told)
+        if not key or name not in (*COLUMNS, ""):
+            expected = "expected NAME=CANONICAL, such as 'Dev1_ai0=u_ab' or 'n=omega_e [rpm]'"
+            known = nearest(name, COLUMNS) if key else ""
+            raise RecordingError(f"--column {shown(text)!r}: {expected}{known}")
+        out[key] = {"name": name, "unit": unit} if unit else name
+    return out
 
 
 def nearest(name, known) -> str:

@@ -16,6 +16,7 @@ TURN = 2.0 * math.pi
 DEGREE = math.pi / 180.0
 RPM = TURN / 60.0
 PEAK = math.sqrt(2.0)
+POUND_FOOT = 0.45359237 * 9.80665 * 0.3048
 
 # quantity -> {unit: factor}; units in OF_SHAFT are also multiplied by the pole pairs.
 FACTORS = {
@@ -74,6 +75,9 @@ FACTORS = {
     },
     "rad/s": {
         "rad/s": 1.0,
+        "rad.s": 1.0,
+        "rad/sec": 1.0,
+        "rad s-1": 1.0,
         "rad/s el": 1.0,
         "mrad/s": 1e-3,
         "deg/s": DEGREE,
@@ -89,6 +93,9 @@ FACTORS = {
         "U/min": RPM,
         "r/min": RPM,
         "rad/s mech": 1.0,
+        "rad.s mech": 1.0,
+        "rad/sec mech": 1.0,
+        "rad s-1 mech": 1.0,
         "deg/s mech": DEGREE,
         "turn/s": TURN,
         "turn/s mech": TURN,
@@ -113,6 +120,13 @@ FACTORS = {
         "N*m": 1.0,
         "N.m": 1.0,
         "N·m": 1.0,
+        "N-m": 1.0,
+        "lb-ft": POUND_FOOT,
+        "lbf-ft": POUND_FOOT,
+        "ft-lb": POUND_FOOT,
+        "in-lb": POUND_FOOT / 12.0,
+        "lb-in": POUND_FOOT / 12.0,
+        "oz-in": POUND_FOOT / 192.0,
         "mNm": 1e-3,
         "Nmm": 1e-3,
         "N.mm": 1e-3,
@@ -134,6 +148,9 @@ OF_SHAFT = {
     "U/min",
     "r/min",
     "rad/s mech",
+    "rad.s mech",
+    "rad/sec mech",
+    "rad s-1 mech",
     "deg/s mech",
     "turn/s",
     "turn/s mech",
@@ -171,9 +188,12 @@ def known_units(column: str) -> str:
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """("i_a", "mA") of "i_a [mA]" or "i_a (mA)"; ("i_a", "") without a unit."""
+    """("i_a", "mA") of "i_a [mA]" or "i_a (mA)"; ("i_a", "") without a unit; "i_abc[0]" is a channel."""
     name = name.strip()
     inside = name[:-1] if name.endswith(("]", ")")) else ""
     start = max(inside.rfind("["), inside.rfind("("))
-    stem, unit = inside[: max(start, 0)].strip(), inside[start + 1 :].strip()
-    return (stem, unit) if stem and not any(c in unit for c in "])") else (name, "")
+    stem, unit = inside[: max(start, 0)], inside[start + 1 :].strip()
+    channel = unit.isdigit() and stem == stem.rstrip()
+    if not stem.strip() or channel or any(c in unit for c in "])"):
+        return name, ""
+    return stem.strip(), unit

@@ -3,8 +3,8 @@
 
 A name counts in lower case, with "_" for spaces and dashes, by the last part of a path in a model ("Model
 Root/Current control/i_a").  Its unit may stand at its end ("id_mA", "n_rpm").  Where the name is that of a channel and
-brackets hold the signal ("Channel A (U_U)"), the signal counts.  Names that may be of something else ("n", "M") count
-only with a unit that tells what they are.  A speed in rad/s may be of the shaft or electrical: it is never guessed.
+brackets hold the signal ("Channel A (U_U)"), the signal counts.  Names that may be of something else ("p", "i") count
+only with a unit that tells what they are.  Names in words, and those of speed, torque and temperature: words.py.
 """
 
 from __future__ import annotations
@@ -12,10 +12,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from fluxproof.diagnosis.ground.recording import COLUMNS
-from fluxproof.diagnosis.ingest.units import FACTORS, OF_BUS, OF_SHAFT, conversion, split_unit
+from fluxproof.diagnosis.ingest.units import FACTORS, OF_BUS, conversion, split_unit
+from fluxproof.diagnosis.ingest.words import PHASES, in_words, is_unit
 
-PHASES = {"a": ("a", "u", "l1"), "b": ("b", "v", "l2"), "c": ("c", "w", "l3")}
 LINES = {"ab": ("ab", "uv"), "bc": ("bc", "vw"), "ca": ("ca", "wu")}
 MEASURED = ("", "_meas", "_measured", "_act", "_actual", "_ist")
 REFERENCE = ("_ref", "ref", "_reference", "_set", "_setpoint", "_soll", "_cmd", "_command")
@@ -50,19 +49,6 @@ for _axis in "dq":
 
 # Names that count only with one of these units.
 TOLD_BY_UNIT = {
-    "omega_e": (
-        ("n", "n_mech", "n_motor", "n_act", "n_ist", "speed", "motor_speed", "speed_mech", "rotor_speed", "drehzahl"),
-        {u for u in FACTORS["rad/s"] if u in OF_SHAFT or u in ("erpm", "rad/s el")},
-    ),
-    "torque": (
-        ("m", "md", "m_shaft", "shaft_torque", "torque_shaft", "torque_meas", "m_welle", "drehmoment"),
-        set(FACTORS["Nm"]),
-    ),
-    "temp_winding": (
-        ("t_winding", "winding_temp", "winding_temperature", "temperature_winding", "t_wdg", "t_wicklung",
-         "temp_wicklung", "t_stator", "temp_stator"),
-        set(FACTORS["degC"]),
-    ),
     "u_line": (("u_ll", "u1_ll", "u_ll_rms", "u_l_l", "urms_ll", "u_line"), {"V rms", "V_rms", "Vrms"}),
     "i_line": (("i", "i1", "i_rms", "irms", "i_line", "i_phase"), {"A rms", "A_rms", "Arms"}),
     "p_el": (("p_el", "p_elec", "p_electric", "p1", "p"), set(FACTORS["W"])),
@@ -83,9 +69,9 @@ def usual(column: str, unit: str) -> tuple[str, str, int] | None:
     """
     name, brackets = split_unit(column)
     found = _of(name, unit or brackets)
-    if found is None and brackets and not _is_unit(brackets):
+    if found is None and brackets and brackets not in OF_BUS and not is_unit(brackets):
         found = _of(brackets, unit)
-    return found
+    return found or in_words(column, unit)
 
 
 def _of(name: str, unit: str) -> tuple[str, str, int] | None:
@@ -108,8 +94,3 @@ def _of(name: str, unit: str) -> tuple[str, str, int] | None:
 def _alike(unit: str, units: set[str]) -> bool:
     """Whether a unit is one of ``units``, whose words may be in any case."""
     return unit.lower() in {u.lower() for u in units}
-
-
-def _is_unit(text: str) -> bool:
-    """Whether a text in brackets is a unit of any column."""
-    return text in OF_BUS or any(conversion(name, text, 1) is not None for name in COLUMNS)

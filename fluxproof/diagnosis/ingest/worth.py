@@ -8,13 +8,19 @@ from __future__ import annotations
 
 import re
 
+from fluxproof.diagnosis.ground.recording import COLUMNS
 from fluxproof.diagnosis.ingest.demand import COMMANDED, CURRENTS
+from fluxproof.quote import shown
 
 FLUX = re.compile(r"(psi|lambda|flux)[ _]?[dq]([ _(\[].*)?", re.I)
 TORQUE = re.compile(r"torque|drehmoment|\bN[ .*]?mm?\b", re.I)
 MAP = (
     ". These are the columns of a flux map, which belongs to the drive and is no recording: name the file in the drive "
     'file, [plant.machine] flux_map = "FILE", with the columns i_d_a, i_q_a, psi_d_wb, psi_q_wb'
+)
+MATRICES = (
+    ". Matrices over two axes are read with a vector for each axis if these have different lengths, else with both "
+    "axes as matrices too ([i_q, omega_e] = meshgrid(...)), or as a table with one row per operating point"
 )
 NO_NAMES = (
     ". The columns have no names: a log needs a header, or [columns] with their numbers; a matrix over speed and "
@@ -33,22 +39,30 @@ ANGLE = (
     ". omega_e would show steady effects, theta_e in addition harmonics and the inverter's loss at standstill; nearest "
     "kind: a slow log or a table of operating points with omega_e"
 )
+UNNAMED = (
+    ". {} may be terminal voltages of a machine that is turned without current (an EMF run): then the command needs {}"
+)
+PROBES = {1: ("u_ab",), 2: ("u_ab", "u_bc"), 3: ("u_a", "u_b", "u_c")}
 LITTLE = (
     ". Quantities of the supply alone show nothing of the machine; nearest kinds: a table (i_d, i_q, u_q_ref, "
     "omega_e), a dyno sheet (torque, i_q, omega_e), an EMF run without current (t, u_ab)"
 )
 
 
-def worth(missing: list[str], names: dict[str, str], have: set[str]) -> str:
-    """The end of a refusal; names: columns of the file with units; have: canonical columns found among them."""
+def worth(missing: list[str], names: dict[str, str], have: set[str], taken=()) -> str:
+    """The end of a refusal; names: columns of the file with units; have: canonical columns, found in those taken."""
     if sum(bool(FLUX.fullmatch(name)) for name in names) >= 2:
         return MAP
+    if sum(name.endswith("[1]") and name[:-3] in COLUMNS for name in names) >= 2:
+        return MATRICES
     if names and all(name.isdigit() for name in names):
         return NO_NAMES
     lacks_voltages = any(text.startswith("voltages") for text in missing)
     if lacks_voltages and any(TORQUE.search(f"{name} {unit}") for name, unit in names.items()):
         return DYNO
     if not CURRENTS & have:
+        if have == {"t"} and len(names) - 1 in PROBES:
+            return _unnamed([name for name in names if name not in taken])
         return "" if COMMANDED & have else LITTLE
     if lacks_voltages:
         return VOLTAGES
@@ -56,3 +70,10 @@ def worth(missing: list[str], names: dict[str, str], have: set[str]) -> str:
     if axis:
         return AXIS.format(axis, axis[-1])
     return ANGLE if any("theta_e" in text for text in missing) else ""
+
+
+def _unnamed(left: list[str]) -> str:
+    """How an EMF run is told whose columns have names of an instrument, "Dev1_ai0"."""
+    options = " ".join(f"--column {shown(f'{n}={u}')!r}" for n, u in zip(left, PROBES[len(left)], strict=True))
+    one = "; =u_a of a phase" if len(left) == 1 else ""
+    return UNNAMED.format(" and ".join(repr(shown(name)) for name in left), f"{options}{one}")

@@ -20,20 +20,21 @@ from fluxproof.quote import escaped
 from golden_model.drive_file import read_tables
 
 
-def refuse_early(recordings, drive) -> None:
+def refuse_early(recordings, drive, named: dict | None = None) -> None:
     """DriveError or RecordingError for input that no diagnosis can use, if that is seen at once; else nothing.
 
-    recordings, drive: paths.  Of several recordings one without its columns is left out and not refused.
+    recordings, drive: paths; named: entries of [columns] that the command adds.  Of several recordings one without its
+    columns is left out and not refused.
     """
     tables = read_tables(drive)
     for path in map(Path, recordings):
         if not path.is_file():
             head_of(path)
-    if len(recordings) == 1 and (nominal := _stand_in(tables, drive)) is not None:
+    if len(recordings) == 1 and (nominal := _stand_in(tables, drive, named or {})) is not None:
         _refuse_columns(Path(recordings[0]), nominal)
 
 
-def _stand_in(tables, drive):
+def _stand_in(tables, drive, named):
     """What the plan of the columns needs of a drive; None if the file's error is to be found by those who read it."""
     machine, columns, constants = (tables.get(key, {}) for key in ("machine", "columns", "constants"))
     if not all(isinstance(part, dict) for part in (machine, columns, constants)):
@@ -42,7 +43,7 @@ def _stand_in(tables, drive):
     if not isinstance(pairs, int) or pairs < 1:
         return None
     return SimpleNamespace(
-        machine=SimpleNamespace(pole_pairs=pairs), columns=columns, constants=constants, path=str(drive)
+        machine=SimpleNamespace(pole_pairs=pairs), columns=columns | named, constants=constants, path=str(drive)
     )
 
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from fluxproof.diagnosis.ground.limits import check_cells, most_cells
 from fluxproof.diagnosis.ground.recording import RecordingError
+from fluxproof.diagnosis.readers.grids import flat
 from fluxproof.diagnosis.readers.hdf5 import SIGNATURE
 from fluxproof.diagnosis.readers.hdf5_walk import check_readable, check_references, tree
 from fluxproof.diagnosis.readers.matlab_tables import tables_of
@@ -66,7 +67,7 @@ def read(path, select=None) -> Table:
     for name, values in (tabled := tables_of(path, found))[0].items():
         _put(name, values, arrays)
     units |= tabled[1]
-    arrays = {name: a for name, a in arrays.items() if a.size > 1}
+    arrays = flat({name: a for name, a in arrays.items() if a.size > 1})
     names = chosen({name: units.get(name, "") for name in arrays}, select, path)
     columns, text = as_columns({name: arrays[name] for name in names}, path)
     table = Table(columns, {n: u for n, u in units.items() if n in columns}, text=text)
@@ -116,13 +117,7 @@ def _put(name, array, arrays) -> None:
     own = name
     while own in arrays:
         own, k = f"{name} ({k})", k + 1
-    array = np.squeeze(array)
-    if array.ndim == 2 and min(array.shape) <= 64:
-        rows = array.T if array.shape[0] > array.shape[1] else array
-        for index, row in enumerate(rows):
-            arrays[f"{own}[{index}]"] = row
-    elif array.ndim == 1:
-        arrays[own] = array
+    arrays[own] = np.squeeze(array)
 
 
 def _limit_inflated(path) -> None:

@@ -26,20 +26,28 @@ class LegVoltage(Effect):
 
     def estimates(self, c, covariance, nominal):
         value = self.size(c, nominal)
-        toward = np.array([c["alpha"], c["beta"]]) / max(value, 1e-12)
-        return {"volts": Estimate(value, float(np.sqrt(max(toward @ covariance @ toward, 0.0))), "V")}
+        pair = np.array([c["alpha"], c["beta"]])
+        spread = lambda weights: float(np.sqrt(max(weights @ covariance[:2, :2] @ weights, 0.0)))  # noqa: E731
+        out = {"volts": Estimate(value, spread(pair / max(value, 1e-12)), "V")}
+        for k, leg in enumerate("abc"):
+            weights = np.array([LEGS["alpha"][k], LEGS["beta"][k]])
+            out[f"leg_{leg}"] = Estimate(float(weights @ pair), spread(weights), "V")
+        return out
 
 
 EFFECT = LegVoltage(
     name="leg_voltage",
     title="unequal voltage errors of the legs",
     clause="the legs of the inverter had different voltage errors, as with unequal gate-driver delays",
-    equation="u = u_recorded - e_abc, constant in the stator frame",
+    equation="u = u_recorded - e_abc, constant in the stator frame, of each leg against the mean",
     signature="order 1 in dq, the same at every speed and current",
     separated_by="two speeds: offsets of the sensors also appear proportional to the speed",
     plausible={"volts": (0.0, 0.03, "inverter.dc_bus_v")},  # as a dead time: legs differ by less than a loss
     otherwise="a gate driver is broken, or a sensor has an offset",
-    parameters=(Parameter("volts", "V", "difference of the legs", "difference"),),
+    parameters=(
+        Parameter("volts", "V", "difference of the legs", "difference"),
+        *(Parameter(f"leg_{x}", "V", f"leg {x} against the mean of the legs", f"leg {x}") for x in "abc"),
+    ),
     needs=("harmonics", "inverter"),
     shows_at=Orders((1.0,)),
 )

@@ -25,6 +25,7 @@ from fluxproof.diagnosis.words.phrases import (
 )
 
 ASSUMED = ("assumed_time",)  # codes of findings
+SENSOR = ("angle_step", "angle_drift", "angle_uneven")  # which a user has to mend, whatever else is found
 REASONS = (*ASSUMED, "gates_off", "repeated", "gap", "dropped", "stuck", "slow_sampling")
 MOST_BESIDE = 2
 MOST_LETTERS = 200  # two lines of a terminal or of the report; only what the checks or the replay found may be longer
@@ -40,7 +41,11 @@ def headline(answer, effects) -> str:
 def _beside(answer) -> str:
     """What the answer rests on and nothing confirms, and beside a refusal what the checks found before."""
     codes = REASONS if answer.verdict == "bad_recording" else ASSUMED
-    found = dict.fromkeys(p.message for p in answer.problems if p.code in codes and not p.fatal)
+    if answer.verdict != "no_mismatch":  # which names what was corrected
+        codes = (*SENSOR, *codes)
+    messages = (p.message.partition(":")[0] if p.code in SENSOR else p.message
+                for p in answer.problems if p.code in codes and not p.fatal)  # fmt: skip
+    found = dict.fromkeys(messages)
     return "".join(f" {capital(message)}." for message in list(found)[:MOST_BESIDE])
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The subcommand ``fluxproof commission drive.toml [--bus sim|/dev/uioN] [--out DIR]``: drive.toml and commission.json.
+"""The subcommand ``fluxproof commission drive.toml [--bus sim|/dev/uioN] [--out DIR] [--watch]``: drive.toml and
+commission.json.
 
 Exit status: 0 accepted, 1 refused, 130 stopped by a signal, with the reason in one line on stderr, 2 bad input.  The
 gates are off at the end, Ctrl-C and SIGTERM included.
@@ -11,6 +12,7 @@ import argparse
 import shutil
 import signal
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -42,6 +44,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="only let this direct current flow through phase a, to compare it with an ammeter",
     )
     parser.add_argument("--out", metavar="DIR", help="folder of the results; default build/commission/NAME")
+    parser.add_argument("--watch", action="store_true", help="a page that shows each step as it runs; ends at Ctrl-C")
+    parser.add_argument("--port", type=int, default=5007, help="of that page (default 5007; 0: any)")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -59,8 +63,18 @@ def run(args: argparse.Namespace) -> int:
     refuse_overwriting([folder / name for name in (DATA, DRIVE, EARLIER)], [args.drive])
     check(folder, (DATA, DRIVE, EARLIER))
     _say("loading")
-    bus = open_bus(args.bus, drive)
-    return commission_file(bus, args.drive, drive, reverse, folder, args.hold)
+    if not args.watch:
+        return commission_file(open_bus(args.bus, drive), args.drive, drive, reverse, folder, args.hold)
+    from fluxproof.watch.commissioning import Page, Watched
+
+    page = Page(drive, args.port)
+    say(f"watching {args.drive}: {page.url}")
+    bus = Watched(open_bus(args.bus, drive), page)
+    status = commission_file(bus, args.drive, drive, reverse, folder, args.hold, page.tell)
+    if status != STOPPED:
+        say("the page stays until Ctrl-C")
+        page.wait()
+    return status
 
 
 def open_bus(name: str, drive):
@@ -74,8 +88,16 @@ def open_bus(name: str, drive):
     return UioBus(name)
 
 
-def commission_file(bus, path: str, drive, reverse: bool | None, folder: Path, hold_a: float | None = None) -> int:
-    """The whole of it on an open bus; the exit status."""
+def commission_file(
+    bus,
+    path: str,
+    drive,
+    reverse: bool | None,
+    folder: Path,
+    hold_a: float | None = None,
+    tell: Callable[[str, object], None] = lambda kind, what: None,
+) -> int:
+    """The whole of it on an open bus; the exit status.  ``tell``: told what runs "now", each "step", and the "end"."""
     from fluxproof.commission import document
     from fluxproof.commission.session import Refusal
     from fluxproof.commission.steps import commission
@@ -84,13 +106,19 @@ def commission_file(bus, path: str, drive, reverse: bool | None, folder: Path, h
     text = read_text(path)
     drive = replace(drive, sensors=replace(drive.sensors, position_reverse=False, theta_offset_rad=0.0))
 
+    def progress(said: str) -> None:
+        tell("now", said)
+        _say(said)
+
     def done(step) -> None:
         steps.append(step)
+        tell("step", step)
         _clear()
         say(f"{step.name}: {step.said}")
 
     def ended(status: str, reason: str, found=None) -> None:
         _clear()
+        tell("end", f"{status}: {reason}" if reason else status)
         if hold_a is not None:  # nothing was measured, so an earlier result stays
             return
         with together(folder, (DATA, DRIVE)) as stage:
@@ -102,7 +130,7 @@ def commission_file(bus, path: str, drive, reverse: bool | None, folder: Path, h
 
     before = _stop_once()
     try:
-        found, _ = commission(bus, drive, reverse, _say, done, hold_a)
+        found, _ = commission(bus, drive, reverse, progress, done, hold_a)
     except Refusal as refusal:
         ended("refused", str(refusal))
         say(f"fluxproof: {path}: refused: {refusal}", sys.stderr)
