@@ -26,7 +26,7 @@ unexport PYTHONHOME
 
 PYTHON_RUN := .venv/bin/python
 
-.PHONY: help setup generate test slow demo papers hil speed bench blind fleet sensitivity real mishaps brought compare timeline live mutate verilog synth ecp5 lint registers package prove faults rough board fuzz lock clean distclean
+.PHONY: help setup generate test slow demo papers hil position speed bench blind fleet sensitivity real mishaps brought compare timeline live mutate verilog synth ecp5 lint registers package prove faults rough board fuzz lock clean distclean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -55,6 +55,9 @@ demo: setup ## run the demonstration
 
 papers: setup ## reproduce the papers' experiments: findings, figures, report
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.papers $(ARGS)
+
+position: setup ## measure the position loop: following error, rest, modes, stops, RTL
+	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.position $(ARGS)
 
 speed: setup ## measure the drive above base speed: losses, torque, both circles, bus sags, RTL
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.speed $(ARGS)

@@ -20,6 +20,7 @@ from golden_model.drive_checks import check
 from golden_model.drive_file import read_sections
 from golden_model.drive_keys import DriveError, flag, needed, not_negative, positive, real, trim, whole
 from golden_model.front_ends import Converters, Encoder
+from golden_model.motion import Position
 from golden_model.supply import Supply
 
 
@@ -201,6 +202,7 @@ class Core:
     updates_per_period: int = whole(1, 2, "1: sampled and updated at the valley; 2: at the valley and the peak", 1)
     estimators: bool = flag("false: field-oriented control alone; flux_mode and the compensation have no effect", True)
     references: bool = flag("true: current references by a table of torque and flux limit, docs/speed_range.md", False)
+    position_loop: bool = flag("true: a position loop over the speed loop, docs/position.md", False)
     residual: bool = flag("true: the motor beside its description, docs/faults.md; needs the estimators", False)
     ring_rows: int = whole(0, 2730, "telemetry rows of the ring in block RAM, 42 in a RAMB36; 0: none", 0)
     gate_active: int = whole(0, 1, "level of the gate pins at which a switch is on", 1)
@@ -245,6 +247,7 @@ class Drive:
     encoder: Encoder = Encoder()
     converters: Converters = Converters()
     supply: Supply = Supply()
+    position: Position = Position()
 
     def __post_init__(self):
         check(self)
@@ -307,6 +310,7 @@ SECTIONS = {
     "encoder": Encoder,
     "converters": Converters,
     "supply": Supply,
+    "position": Position,
 }
 
 

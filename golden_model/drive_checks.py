@@ -7,6 +7,7 @@ from golden_model.drive_keys import DriveError
 from golden_model.fluxproof import SAMPLE_INTERVAL
 from golden_model.formats import PU, VECTOR
 from golden_model.front_ends import check_converters, check_encoder
+from golden_model.motion import check_position
 from golden_model.protection_limits import default_u_dc_max_v, regen_end_v
 
 CARRIER_HALF_RANGE = (8, 32767)  # generic CARRIER_HALF of rtl/fluxproof.vhd
@@ -267,6 +268,6 @@ def _regeneration(drive):
 
 RULES = (
     _sample_time, _sampling, _carrier, _pulses, _low_side, _samples_per_turn, _voltage, _current, _flux, _codes,
-    _speed_loop, _current_loop, _flux_loop, _adaline_steps, _protection, _residual, _regeneration,
-    check_encoder, check_converters,
+    _speed_loop, _current_loop, _flux_loop, _adaline_steps, _protection, _regeneration, _residual,
+    check_encoder, check_converters, check_position,
 )  # fmt: skip

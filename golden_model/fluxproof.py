@@ -17,6 +17,8 @@ from golden_model.control import (
     current_reference,
     dead_time_compensation,
     decoupling,
+    position_control,
+    position_trajectory,
     regeneration_limit,
     speed_pi,
     torque_reference,
@@ -79,7 +81,9 @@ WIRING = {
     "rotor_frame": (park, ("stator_frame", "trig")),
     "current_circle": (current_limit, ("latch",)),
     "table_current": (current_reference, ("current_circle",)),
-    "speed_regulator": (speed_pi, ("speed_measurement", "current_circle")),
+    "position_regulator": (position_control, ("latch",)),
+    "trajectory": (position_trajectory, ("position_regulator",)),
+    "speed_regulator": (speed_pi, ("speed_measurement", "current_circle", "position_regulator")),
     "regeneration": (regeneration_limit, ("speed_regulator", "bus_voltage")),
     "references": (torque_reference, ("speed_regulator", "bus_voltage")),
     "current_regulators": (current_pi, ("rotor_frame", "regeneration", "current_circle")),
@@ -186,6 +190,7 @@ class Config(NamedTuple):
     carrier_half: int = 10000
     estimators: int = 1  # 0: field-oriented control alone
     references: int = 0  # 1: current references by a table of torque and flux limit
+    position_loop: int = 0  # 1: a position loop over the speed loop, and its trajectory
     residual: int = 0  # 1: the residual of the motor beside its description, with the estimators
 
 
@@ -261,6 +266,13 @@ class State(NamedTuple):
     of_torque_reference: torque_reference.State = torque_reference.State()
     regen_limited: int = 0
     of_regeneration_limit: regeneration_limit.State = regeneration_limit.State()
+    # The position loop's part, last for the same reason
+    of_position_control: position_control.State = position_control.State()
+    of_position_trajectory: position_trajectory.State = position_trajectory.State()
+    position_ref: int = 0
+    omega_ff: int = 0
+    torque_ff: int = 0
+    at_rest: int = 0
     of_motor_residual: motor_residual.State = motor_residual.State()
 
 
@@ -340,6 +352,8 @@ class Observed(NamedTuple):
     brake_asked: int
     speed_was_given: int
     position_restarted: int
+    shaft_position: int
+    position_error: int
     code_a: int
     code_b: int
     code_c: int
@@ -414,9 +428,25 @@ def step_table(state, sample, regs, config, of_speed, table):
     i_d_asked = state.i_d_table if by_table else x.i_d_ref
     current_limit_state, (i_d_limited, i_q_max) = current_limit.step(state.of_current_limit, i_d_asked, r.i_max)
     most = state.torque_max if by_table else i_q_max
+    position_state, (shaft_position, position_error, omega_asked, regulates) = (
+        state.of_position_control, (0, 0, x.omega_ref, x.speed_mode),
+    )  # fmt: skip
+    if c.position_loop:
+        position_state, (shaft_position, position_error, omega_asked, regulates) = position_control.step(
+            state.of_position_control,
+            position_control.Inputs(
+                code_theta=x.position_code, position_ref=state.position_ref, omega_ff=state.omega_ff,
+                at_rest=state.at_rest, omega_ref=x.omega_ref, speed_mode=x.speed_mode,
+            ),
+            position_control.Registers(
+                reverse=r.reverse, position_restart=of_speed.position_restart, position_mode=r.position_mode,
+                position_kp=r.position_kp, position_band=r.position_band, omega_most=r.omega_most,
+            ),
+            c.position_bits,
+        )  # fmt: skip
     speed_pi_state, (torque_ref, speed_limited) = speed_pi.step(
-        state.of_speed_pi, x.omega_ref, omega_me, x.i_q_ext, most, state.regen_limited, x.speed_mode, x.run,
-        r.speed_kp, r.speed_ki,
+        state.of_speed_pi, omega_asked, omega_me, x.i_q_ext, most, state.regen_limited, regulates, x.run,
+        state.torque_ff, r.speed_kp, r.speed_ki,
     )  # fmt: skip
     i_q_asked, table_current_state = torque_ref, state.of_current_reference
     if c.references:
@@ -471,6 +501,12 @@ def step_table(state, sample, regs, config, of_speed, table):
             state.of_torque_reference, asked, r, table
         )
 
+    trajectory_state, (position_ref, omega_ff, torque_ff, at_rest) = state.of_position_trajectory, (0, 0, 0, 0)
+    if c.position_loop:
+        trajectory_state, (position_ref, omega_ff, torque_ff, at_rest) = position_trajectory.step(
+            state.of_position_trajectory, position_trajectory.Inputs(shaft_position=shaft_position, run=x.run), r
+        )
+
     checks_state, (sample_faults, sample_trip) = sample_checks.step(
         state.of_sample_checks,
         sample_checks.Inputs(
@@ -488,7 +524,7 @@ def step_table(state, sample, regs, config, of_speed, table):
         state.of_offset_check, i_a, i_b, i_c, omega_me, x.run, r.omega_stall, r.offset_max
     )
     motion_checks_state, (motion_faults,) = motion_checks.step(
-        state.of_motion_checks, omega_me, x.omega_ref, x.speed_mode, speed_limited, regen_limited, x.run, r.omega_trip,
+        state.of_motion_checks, omega_me, omega_asked, regulates, speed_limited, regen_limited, x.run, r.omega_trip,
         r.omega_away, r.runaway_samples, r.omega_stall, r.stall_samples,
     )  # fmt: skip
     emf_check_state, (encoder_lost,) = emf_check.step(
@@ -521,6 +557,8 @@ def step_table(state, sample, regs, config, of_speed, table):
         s_alpha=after.s_alpha, s_beta=after.s_beta, of_current_reference=table_current_state,
         of_torque_reference=references_state, i_d_table=i_d_table, i_q_table=i_q_table, torque_max=torque_max,
         regen_limited=regen_limited, of_regeneration_limit=regeneration_state,
+        of_position_control=position_state, of_position_trajectory=trajectory_state, position_ref=position_ref,
+        omega_ff=omega_ff, torque_ff=torque_ff, at_rest=at_rest,
         of_motor_residual=after.of_motor_residual,
     )  # fmt: skip
     return following, Observed(
@@ -542,7 +580,8 @@ def step_table(state, sample, regs, config, of_speed, table):
         sample_faults=sample_faults, sample_trip=sample_trip, current_offset=current_offset,
         motion_faults=motion_faults, open_load=open_load, encoder_lost=encoder_lost, brake_asked=brake_asked,
         speed_was_given=speed_was_given,
-        position_restarted=position_restarted, code_a=x.adc_a, code_b=x.adc_b, code_c=x.adc_c, code_u_dc=x.adc_u_dc,
+        position_restarted=position_restarted, shaft_position=shaft_position, position_error=position_error,
+        code_a=x.adc_a, code_b=x.adc_b, code_c=x.adc_c, code_u_dc=x.adc_u_dc,
         code_theta=x.position_code, compare_a=compare_a, compare_b=compare_b, compare_c=compare_c,
     )  # fmt: skip
 

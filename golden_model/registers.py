@@ -51,8 +51,15 @@ def registers(drive: Drive, flux=None) -> RegisterSet:
     entries = {e.name: e for part in PARTS for e in part(drive)} | {e.name: e for e in references(drive, table)}
     rows = {name: _row(entries[name], port) for name, port in REGISTERS.items()}
     _keep_pulse_above_dead_time(rows, drive)
-    built = tuple(int(part) for part in (drive.core.estimators, drive.core.references, drive.core.residual))
-    config = Config(drive.sensors.adc_bits, drive.sensors.position_bits, drive.carrier_half, *built)
+    core = drive.core
+    generics = (
+        drive.carrier_half,
+        int(core.estimators),
+        int(core.references),
+        int(core.position_loop),
+        int(core.residual),
+    )
+    config = Config(drive.sensors.adc_bits, drive.sensors.position_bits, *generics)
     values = Registers(*(rows[name].integer for name in REGISTERS))
     words = BLANK if table is None else table.words(drive.bases, drive.torque_base_nm)
     return RegisterSet(values, config, tuple(rows.values()), words)

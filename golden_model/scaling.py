@@ -25,6 +25,7 @@ docs/board.md.
 
 import math
 
+from golden_model.motion import position_loop
 from golden_model.protection_limits import protection
 from golden_model.scale_entry import Entry, base_keys, leg_loss_v
 from golden_model.units import TURN_RAD
@@ -213,9 +214,10 @@ def vsi_estimators(drive):
     )
     yield Entry("v_comp_max", most, "V", b.voltage_v, f"{keys}; {volts}")
     start, keys = c.v_dead_start_v, "[control] v_dead_start_v"
-    if start is None:  # from the data where torques are asked, which needs the flux from the first second
-        start = leg_loss_v(drive) if drive.core.references and c.dead_time_compensation else 0.0
-        keys = "[core] references; [inverter] dead_time_s, pwm_frequency_hz, dc_bus_v"
+    if start is None:  # from the data where a torque must be right from the first second
+        wanted = (drive.core.references or drive.core.position_loop) and c.dead_time_compensation
+        start = leg_loss_v(drive) if wanted else 0.0
+        keys = "[core] references, position_loop; [inverter] dead_time_s, pwm_frequency_hz, dc_bus_v"
     yield Entry("v_start", min(start, most), "V", b.voltage_v, f"{keys}; {volts}")
     least, keys = LEARN_OF_RATED * m.rated_current_a, "[machine] rated_current_a"
     yield Entry("i_learn", least, "A", b.current_a, f"{keys}; {amperes}")
@@ -251,4 +253,4 @@ def gates(drive):
     yield Entry("double_update", drive.core.updates_per_period - 1, "1", 1.0, "[core] updates_per_period")
 
 
-PARTS = (sensing, speed_loop, current_loop, flux_estimator, vsi_estimators, gates, protection)
+PARTS = (sensing, speed_loop, current_loop, flux_estimator, vsi_estimators, gates, position_loop, protection)

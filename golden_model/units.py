@@ -57,10 +57,16 @@ ONE_IS = {
     "s/rad": "1/omega_base",
     "s2/rad2": "1/omega_base/omega_base",
     "1/s": "1/T_s",
+    "A s/rad of shaft": "I_base*T_s/(2*pi)",
+    "Nm s/rad of shaft": "1.5*pole_pairs*I_base*U_base/omega_base*T_s/(2*pi)",
+    "A s2/rad": "I_base*T_s*T_s/(2*pi)",
+    "Nm s2/rad": "1.5*pole_pairs*I_base*U_base/omega_base*T_s*T_s/(2*pi)",
 }
 _ONE_OF_REGISTER = {
     "k_delay": "2*pi/omega_base",
     "omega_0": "1/T_s",
+    "position_kp": "omega_base/(2*pi*pole_pairs)",
+    "move_speed": "2*pi/T_s",
     **dict.fromkeys(("dead_time", "min_pulse", "watchdog"), "1/clock_hz"),
     **dict.fromkeys(
         ("runaway_samples", "stall_samples", "emf_samples", "residual_samples", "heartbeat", "charge_samples"), "T_s"

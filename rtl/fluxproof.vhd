@@ -10,6 +10,8 @@
 -- with flux_mode 0, dead time is not compensated, and what they would show is zero.
 -- REFERENCES = 1 builds the torque table: with use_table the speed regulator's output is a torque, i_q_ext too, and the
 -- table gives both current references at the flux limit of speed and bus voltage, see control/torque_reference.vhd.
+-- POSITION_LOOP = 1 builds a position loop over the speed loop and the trajectory that it follows, used with
+-- position_mode, see control/position_trajectory.vhd.
 -- RESIDUAL = 1 compares the motor with its description, see estimators/motor_residual.vhd.
 -- Formats: per unit, see golden_model/formats.py; settings as `fluxproof registers drive.toml` prints them.
 -- Latency: sample_valid to duty_valid FLUXPROOF_SAMPLE_TO_DUTY clocks; samples FLUXPROOF_SAMPLE_INTERVAL or more apart.
@@ -31,6 +33,7 @@ entity fluxproof is
     CARRIER_HALF  : positive range 8 to 32767 := 10000;  -- half a PWM period in clocks
     ESTIMATORS    : natural range 0 to 1      := 1;  -- 0: field-oriented control alone
     REFERENCES    : natural range 0 to 1      := 0;  -- 1: current references by a table of torque and flux limit
+    POSITION_LOOP : natural range 0 to 1      := 0;  -- 1: a position loop over the speed loop, and its trajectory
     RESIDUAL      : natural range 0 to 1      := 0  -- 1: the residual of the motor, with the estimators
   );
   port (
@@ -97,6 +100,10 @@ architecture rtl of fluxproof is
 
   -- From the torque table to the control
   signal i_d_asked, torque_limit, torque_ref : signed(PU_W - 1 downto 0);
+
+  -- From the position loop to the speed regulator
+  signal omega_asked, torque_ff : signed(PU_W - 1 downto 0);
+  signal regulates              : std_logic;
 
   -- From the estimators to the control
   signal flux_mode              : unsigned(1 downto 0);
@@ -200,10 +207,45 @@ begin
               i_max => settings.i_max,
               out_valid => circle_valid, i_d_limited => i_d_limited, i_q_max => i_q_max);
 
+  by_position : if POSITION_LOOP = 1 generate
+    signal position_valid : std_logic;
+    signal position_ref   : signed(o.shaft_position'range);
+    signal omega_ff       : signed(INTEGRAL_W - 1 downto 0);
+    signal at_rest        : std_logic;
+  begin
+    position_regulator : entity work.position_control
+      generic map (POSITION_BITS => POSITION_BITS)
+      port map (clk => clk, rst => rst, in_valid => latch_valid,
+                code_theta => code_theta, position_ref => position_ref, omega_ff => omega_ff, at_rest => at_rest,
+                omega_ref => omega_ref, speed_mode => speed_mode,
+                reverse => settings.reverse, position_restart => settings.position_restart,
+                position_mode => settings.position_mode, position_kp => settings.position_kp,
+                position_band => settings.position_band, omega_most => settings.omega_most,
+                out_valid => position_valid, shaft_position => o.shaft_position, position_error => o.position_error,
+                omega_asked => omega_asked, regulates => regulates);
+
+    trajectory : entity work.position_trajectory
+      port map (clk => clk, rst => rst, in_valid => position_valid,
+                shaft_position => o.shaft_position, run => run,
+                position_mode => settings.position_mode, position_target => settings.position_target,
+                move_speed => settings.move_speed, move_step => settings.move_step, jerk_bits => settings.jerk_bits,
+                use_stops => settings.use_stops, stop_low => settings.stop_low, stop_high => settings.stop_high,
+                torque_lead => settings.torque_lead, k_speed => settings.k_speed, k_filter => settings.k_filter,
+                k_inertia => settings.k_inertia, k_viscous => settings.k_viscous, coulomb => settings.coulomb,
+                out_valid => open, position_ref => position_ref, omega_ff => omega_ff, torque_ff => torque_ff,
+                at_rest => at_rest);
+  else generate
+    omega_asked      <= omega_ref;
+    regulates        <= speed_mode;
+    torque_ff        <= (others => '0');
+    o.shaft_position <= (others => '0');
+    o.position_error <= (others => '0');
+  end generate by_position;
+
   speed_regulator : entity work.speed_pi
     port map (clk => clk, rst => rst, in_valid => omega_valid,
-              omega_ref => omega_ref, omega_me => o.omega_me, i_q_ext => i_q_ext, i_q_max => torque_limit,
-              regen_limited => o.regen_limited, speed_mode => speed_mode, run => run,
+              omega_ref => omega_asked, omega_me => o.omega_me, i_q_ext => i_q_ext, i_q_max => torque_limit,
+              regen_limited => o.regen_limited, speed_mode => regulates, run => run, torque_ff => torque_ff,
               speed_kp => settings.speed_kp, speed_ki => settings.speed_ki,
               out_valid => reference_valid, i_q_ref => torque_ref, speed_limited => o.speed_limited);
 
@@ -491,7 +533,7 @@ begin
               voltage_valid => dq_voltage_valid,
               i_a => o.i_a, i_b => o.i_b, i_c => o.i_c, current_at_rail => o.current_at_rail, u_dc => o.u_dc,
               u_dc_at_rail => o.u_dc_at_rail, code_theta => code_theta, theta_me => o.theta_me, omega_me => o.omega_me,
-              omega_ref => omega_ref, speed_mode => speed_mode, i_q_ref => o.i_q_ref, speed_limited => o.speed_limited,
+              omega_ref => omega_asked, speed_mode => regulates, i_q_ref => o.i_q_ref, speed_limited => o.speed_limited,
               regen_limited => o.regen_limited, u_d => o.u_d, u_q => o.u_q, u_comp_d => e.u_comp_d, u_comp_q => e.u_comp_q, i_d => o.i_d, i_q => o.i_q,
               model_d => model_d, model_q => model_q,
               run => run, trip => trip, enable => enable, clear_trip => clear_trip, host_write => host_write,

@@ -10,6 +10,7 @@ proc init_gui {IPINST} {
   ipgui::add_param $IPINST -name "CARRIER_HALF" -parent ${page}
   ipgui::add_param $IPINST -name "ESTIMATORS" -parent ${page}
   ipgui::add_param $IPINST -name "REFERENCES" -parent ${page}
+  ipgui::add_param $IPINST -name "POSITION_LOOP" -parent ${page}
   ipgui::add_param $IPINST -name "RESIDUAL" -parent ${page}
   ipgui::add_param $IPINST -name "RING_ROWS" -parent ${page}
   ipgui::add_param $IPINST -name "GATE_ACTIVE" -parent ${page}
@@ -81,6 +82,17 @@ proc validate_PARAM_VALUE.REFERENCES {PARAM_VALUE.REFERENCES} {
 
 proc update_MODELPARAM_VALUE.REFERENCES {MODELPARAM_VALUE.REFERENCES PARAM_VALUE.REFERENCES} {
   set_property value [get_property value ${PARAM_VALUE.REFERENCES}] ${MODELPARAM_VALUE.REFERENCES}
+}
+
+proc update_PARAM_VALUE.POSITION_LOOP {PARAM_VALUE.POSITION_LOOP} {
+}
+
+proc validate_PARAM_VALUE.POSITION_LOOP {PARAM_VALUE.POSITION_LOOP} {
+  return true
+}
+
+proc update_MODELPARAM_VALUE.POSITION_LOOP {MODELPARAM_VALUE.POSITION_LOOP PARAM_VALUE.POSITION_LOOP} {
+  set_property value [get_property value ${PARAM_VALUE.POSITION_LOOP}] ${MODELPARAM_VALUE.POSITION_LOOP}
 }
 
 proc update_PARAM_VALUE.RESIDUAL {PARAM_VALUE.RESIDUAL} {

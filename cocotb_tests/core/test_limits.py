@@ -205,7 +205,7 @@ def test_units_of_the_registers_are_the_scales():
     drive = drives.load(ROOT / "docs" / "drives" / "emrax228.toml")
     b = drive.bases
     known = {"I_base": b.current_a, "U_base": b.voltage_v, "omega_base": b.omega_me_rad_s, "T_s": drive.sample_time_s}
-    known |= {"clock_hz": drive.core.clock_hz, "pi": math.pi}
+    known |= {"clock_hz": drive.core.clock_hz, "pi": math.pi, "pole_pairs": drive.machine.pole_pairs}
     checked = 0
     for entry in (e for part in PARTS for e in part(drive)):
         says = one_is(entry.name, entry.unit).removesuffix("/K").removesuffix(" rad").removesuffix(" degC")

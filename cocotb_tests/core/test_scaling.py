@@ -61,7 +61,7 @@ def test_speed_regulator_product_is_amperes(path):
     result = registers(drive)
     v, kp = result.values, next(row.si for row in result.rows if row.name == "speed_kp")
     err = from_si("omega_ref", 0.5 * drive.current_limit_a / kp, drive)
-    _, (i_q_ref, limited) = speed_pi.step(speed_pi.State(), err, 0, 0, v.i_max, 1, 1, v.speed_kp, v.speed_ki)
+    _, (i_q_ref, limited) = speed_pi.step(speed_pi.State(), err, 0, 0, v.i_max, 0, 1, 1, 0, v.speed_kp, v.speed_ki)
     expected = kp * to_si("omega_ref", err, drive)
     assert limited == 0
     assert to_si("i_q_ref", i_q_ref, drive) == pytest.approx(expected, rel=1e-4)

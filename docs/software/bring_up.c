@@ -150,6 +150,7 @@ static void check_generics(void)
 #ifdef FLUXPROOF_TORQUE_TABLE
         {"REFERENCES", AT(references), 1},
 #endif
+        {"POSITION_LOOP", AT(position_loop), FLUXPROOF_POSITION_LOOP},
 #if FLUXPROOF_RESIDUAL
         {"RESIDUAL", AT(residual), 1},
 #endif

@@ -53,6 +53,11 @@ extern "C" {
 #define FLUXPROOF__REFERENCES__VALUE_bp 0
 #define FLUXPROOF__REFERENCES__VALUE_bw 32
 
+// reg - fluxproof::position_loop
+#define FLUXPROOF__POSITION_LOOP__VALUE_bm 0xffffffff
+#define FLUXPROOF__POSITION_LOOP__VALUE_bp 0
+#define FLUXPROOF__POSITION_LOOP__VALUE_bw 32
+
 // reg - fluxproof::residual
 #define FLUXPROOF__RESIDUAL__VALUE_bm 0xffffffff
 #define FLUXPROOF__RESIDUAL__VALUE_bp 0
@@ -880,6 +885,106 @@ extern "C" {
 #define FLUXPROOF__TORQUE_STEP__VALUE_bw 32
 #define FLUXPROOF__TORQUE_STEP__VALUE_reset 0x0
 
+// reg - fluxproof::position_mode
+#define FLUXPROOF__POSITION_MODE__VALUE_bm 0x1
+#define FLUXPROOF__POSITION_MODE__VALUE_bp 0
+#define FLUXPROOF__POSITION_MODE__VALUE_bw 1
+#define FLUXPROOF__POSITION_MODE__VALUE_reset 0x0
+
+// reg - fluxproof::position_target
+#define FLUXPROOF__POSITION_TARGET__VALUE_bm 0xffffffff
+#define FLUXPROOF__POSITION_TARGET__VALUE_bp 0
+#define FLUXPROOF__POSITION_TARGET__VALUE_bw 32
+#define FLUXPROOF__POSITION_TARGET__VALUE_reset 0x0
+
+// reg - fluxproof::position_kp
+#define FLUXPROOF__POSITION_KP__VALUE_bm 0xffffff
+#define FLUXPROOF__POSITION_KP__VALUE_bp 0
+#define FLUXPROOF__POSITION_KP__VALUE_bw 24
+#define FLUXPROOF__POSITION_KP__VALUE_reset 0x0
+
+// reg - fluxproof::position_band
+#define FLUXPROOF__POSITION_BAND__VALUE_bm 0xffff
+#define FLUXPROOF__POSITION_BAND__VALUE_bp 0
+#define FLUXPROOF__POSITION_BAND__VALUE_bw 16
+#define FLUXPROOF__POSITION_BAND__VALUE_reset 0x0
+
+// reg - fluxproof::omega_most
+#define FLUXPROOF__OMEGA_MOST__VALUE_bm 0xffffffff
+#define FLUXPROOF__OMEGA_MOST__VALUE_bp 0
+#define FLUXPROOF__OMEGA_MOST__VALUE_bw 32
+#define FLUXPROOF__OMEGA_MOST__VALUE_reset 0x0
+
+// reg - fluxproof::move_speed
+#define FLUXPROOF__MOVE_SPEED__VALUE_bm 0x7fffffff
+#define FLUXPROOF__MOVE_SPEED__VALUE_bp 0
+#define FLUXPROOF__MOVE_SPEED__VALUE_bw 31
+#define FLUXPROOF__MOVE_SPEED__VALUE_reset 0x0
+
+// reg - fluxproof::move_step
+#define FLUXPROOF__MOVE_STEP__VALUE_bm 0x7fffffff
+#define FLUXPROOF__MOVE_STEP__VALUE_bp 0
+#define FLUXPROOF__MOVE_STEP__VALUE_bw 31
+#define FLUXPROOF__MOVE_STEP__VALUE_reset 0x0
+
+// reg - fluxproof::jerk_bits
+#define FLUXPROOF__JERK_BITS__VALUE_bm 0x7
+#define FLUXPROOF__JERK_BITS__VALUE_bp 0
+#define FLUXPROOF__JERK_BITS__VALUE_bw 3
+#define FLUXPROOF__JERK_BITS__VALUE_reset 0x0
+
+// reg - fluxproof::torque_lead
+#define FLUXPROOF__TORQUE_LEAD__VALUE_bm 0x7
+#define FLUXPROOF__TORQUE_LEAD__VALUE_bp 0
+#define FLUXPROOF__TORQUE_LEAD__VALUE_bw 3
+#define FLUXPROOF__TORQUE_LEAD__VALUE_reset 0x0
+
+// reg - fluxproof::use_stops
+#define FLUXPROOF__USE_STOPS__VALUE_bm 0x1
+#define FLUXPROOF__USE_STOPS__VALUE_bp 0
+#define FLUXPROOF__USE_STOPS__VALUE_bw 1
+#define FLUXPROOF__USE_STOPS__VALUE_reset 0x0
+
+// reg - fluxproof::stop_low
+#define FLUXPROOF__STOP_LOW__VALUE_bm 0xffffffff
+#define FLUXPROOF__STOP_LOW__VALUE_bp 0
+#define FLUXPROOF__STOP_LOW__VALUE_bw 32
+#define FLUXPROOF__STOP_LOW__VALUE_reset 0x0
+
+// reg - fluxproof::stop_high
+#define FLUXPROOF__STOP_HIGH__VALUE_bm 0xffffffff
+#define FLUXPROOF__STOP_HIGH__VALUE_bp 0
+#define FLUXPROOF__STOP_HIGH__VALUE_bw 32
+#define FLUXPROOF__STOP_HIGH__VALUE_reset 0x0
+
+// reg - fluxproof::k_inertia
+#define FLUXPROOF__K_INERTIA__VALUE_bm 0xffffff
+#define FLUXPROOF__K_INERTIA__VALUE_bp 0
+#define FLUXPROOF__K_INERTIA__VALUE_bw 24
+#define FLUXPROOF__K_INERTIA__VALUE_reset 0x0
+
+// reg - fluxproof::k_viscous
+#define FLUXPROOF__K_VISCOUS__VALUE_bm 0xffffff
+#define FLUXPROOF__K_VISCOUS__VALUE_bp 0
+#define FLUXPROOF__K_VISCOUS__VALUE_bw 24
+#define FLUXPROOF__K_VISCOUS__VALUE_reset 0x0
+
+// reg - fluxproof::coulomb
+#define FLUXPROOF__COULOMB__VALUE_bm 0xffffffff
+#define FLUXPROOF__COULOMB__VALUE_bp 0
+#define FLUXPROOF__COULOMB__VALUE_bw 32
+#define FLUXPROOF__COULOMB__VALUE_reset 0x0
+
+// reg - fluxproof::shaft_position
+#define FLUXPROOF__SHAFT_POSITION__VALUE_bm 0xffffffff
+#define FLUXPROOF__SHAFT_POSITION__VALUE_bp 0
+#define FLUXPROOF__SHAFT_POSITION__VALUE_bw 32
+
+// reg - fluxproof::position_error
+#define FLUXPROOF__POSITION_ERROR__VALUE_bm 0xffffffff
+#define FLUXPROOF__POSITION_ERROR__VALUE_bp 0
+#define FLUXPROOF__POSITION_ERROR__VALUE_bw 32
+
 // reg - fluxproof::residual_min
 #define FLUXPROOF__RESIDUAL_MIN__VALUE_bm 0x1ffff
 #define FLUXPROOF__RESIDUAL_MIN__VALUE_bp 0
@@ -1542,8 +1647,9 @@ typedef struct {
     uint32_t clock_hz;
     uint32_t estimators;
     uint32_t references;
+    uint32_t position_loop;
     uint32_t residual;
-    uint8_t RESERVED_24_3f[0x1c];
+    uint8_t RESERVED_28_3f[0x18];
     uint32_t enable;
     uint32_t clear_trip;
     uint32_t clear_faults;
@@ -1683,7 +1789,26 @@ typedef struct {
     uint32_t table_word;
     uint32_t v_start;
     uint32_t torque_step;
-    uint8_t RESERVED_278_33f[0xc8];
+    uint8_t RESERVED_278_27f[0x8];
+    uint32_t position_mode;
+    uint32_t position_target;
+    uint32_t position_kp;
+    uint32_t position_band;
+    uint32_t omega_most;
+    uint32_t move_speed;
+    uint32_t move_step;
+    uint32_t jerk_bits;
+    uint32_t torque_lead;
+    uint32_t use_stops;
+    uint32_t stop_low;
+    uint32_t stop_high;
+    uint32_t k_inertia;
+    uint32_t k_viscous;
+    uint32_t coulomb;
+    uint8_t RESERVED_2bc_2df[0x24];
+    uint32_t shaft_position;
+    uint32_t position_error;
+    uint8_t RESERVED_2e8_33f[0x58];
     uint32_t residual_min;
     uint32_t residual_w;
     uint32_t residual_i;

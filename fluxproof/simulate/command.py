@@ -71,6 +71,7 @@ def summary(data: dict) -> list[str]:
             "brake_resistor_at_most",
             "brake_resistor_on_from",
         ),
+        "Position": ("time_of_the_move", "following_error_largest", "position_error_at_the_end"),
         "Heat": ("copper_loss_at_rated_current",),
     }
     for group, names in told.items():

@@ -15,13 +15,16 @@ from fluxproof.simulate.figures import rpm
 from fluxproof.simulate.margins import Loop
 from fluxproof.simulate.run import Run
 from golden_model.drive import Drive
+from golden_model.motion import count_turns
 from golden_model.units import to_si
 
 COLUMNS = 700  # along the time axis: more than a screen's pixels in a picture of this width
 
 
-def draw(drive: Drive, run: Run, step: Run, loops: dict[str, Loop], rippled: dict) -> dict[str, theme.Picture]:
-    """All pictures by name; ``run`` is the scene, ``step`` the step of the current."""
+def draw(
+    drive: Drive, run: Run, step: Run, loops: dict[str, Loop], rippled: dict, moved: Run | None = None
+) -> dict[str, theme.Picture]:
+    """All pictures by name; ``run`` is the scene, ``step`` the step of the current, ``moved`` the move."""
     drawn = {}
     with mpl.rc_context(theme.STYLE), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a font may lack a glyph
@@ -31,6 +34,8 @@ def draw(drive: Drive, run: Run, step: Run, loops: dict[str, Loop], rippled: dic
         drawn["current_step"] = current_step(drive, step)
         drawn["ripple"] = ripple(rippled)
         drawn["loops"] = bode(loops)
+        if moved is not None:
+            drawn["position"] = position(drive, moved)
     return drawn
 
 
@@ -69,6 +74,16 @@ def speed(drive: Drive, run: Run) -> theme.Picture:
     theme.key(axis, *words)
     names = ", ".join(stage.name for stage in run.scene.stages)
     return theme.picture("speed", figure, f"Stages, at the vertical lines: {names}.")
+
+
+def position(drive: Drive, run: Run) -> theme.Picture:
+    """Position, and how far it is from the trajectory."""
+    figure, panels = theme.panels(2, 1, height=3.6, sharex=True)
+    _lines(panels[0], run, (360.0 * run["shaft_position"], theme.AFTER, "-"))
+    panels[0].set(title="Position", ylabel="degrees", xlabel="")
+    _lines(panels[1], run, (run["position_error"] / count_turns(drive), theme.AFTER, "-"))
+    panels[1].set(title="Following error", ylabel="counts")
+    return theme.picture("position", figure, "A move there and back in position mode; the error in counts.")
 
 
 def currents(drive: Drive, run: Run) -> theme.Picture:

@@ -18,7 +18,8 @@ from golden_model.io.fault_latch import NAMES
 from golden_model.registers import RegisterSet
 from golden_model.units import to_si
 
-IN_SI = ("i_d", "i_q", "i_q_ref", "u_d", "u_q", "u_max", "theta_me", "omega_me", "v_comp", "torque")
+IN_SI = ("i_d", "i_q", "i_q_ref", "u_d", "u_q", "u_max", "theta_me", "omega_me", "v_comp", "torque", "shaft_position",
+         "position_error")  # fmt: skip
 
 
 @dataclass

@@ -10,6 +10,7 @@ import numpy as np
 
 from fluxproof.simulate import figures, page, verdict
 from fluxproof.simulate.margins import current_loop, margins, speed_loop, turning_current_loop
+from fluxproof.simulate.move import move_scene, of_move
 from fluxproof.simulate.regeneration import Regeneration, regeneration, told
 from fluxproof.simulate.ripple import ripple
 from fluxproof.simulate.run import Run, run
@@ -34,6 +35,7 @@ def simulate(
     step = run(drive, register_set, current_step(drive))
     fast = run(drive, register_set, fast_current_step(drive))
     main = run(drive, register_set, scene, lambda done, total: say(f"{100 * done // total} %"))
+    moved = run(drive, register_set, move_scene(drive)) if drive.core.position_loop else None
     loops = {f"current loop, {axis} axis": current_loop(drive, register_set, axis) for axis in "dq"}
     loops["current loop, top speed"] = turning_current_loop(drive, register_set, fastest(drive))
     outer = speed_loop(drive, register_set)
@@ -44,7 +46,7 @@ def simulate(
     loaded = main.scene.stages[2]
     rippled = ripple(drive, main, loaded.end, _turn(drive, main, loaded.end))
     back = regeneration(drive, _untripped(drive, register_set, main))
-    status, reason = verdict.judge(drive, found, [step, fast, main])
+    status, reason = verdict.judge(drive, found, [step, fast, main, *([] if moved is None else [moved])])
     if status == "tripped" and "u_dc_high" in main.faults:
         reason = f"{reason}: {told(drive, back)}"
     data = {
@@ -59,11 +61,15 @@ def simulate(
         "not_modelled": verdict.not_modelled(drive, [main], plant),
     }
 
+    if moved is not None:
+        data["figures"]["Position"] = of_move(drive, moved)
+        data["move"] = [_stage(drive, stage) for stage in moved.scene.stages]
+
     def pages() -> str:
         from fluxproof.simulate import pictures  # matplotlib takes a second
 
         say("report")
-        return page.render(data, drive, pictures.draw(drive, main, step, loops, rippled))
+        return page.render(data, drive, pictures.draw(drive, main, step, loops, rippled, moved))
 
     return data, pages
 

@@ -2,18 +2,19 @@
 """Speed regulator: from speed error to i_q reference, limited, with conditional integration.
 
     err     = omega_ref - omega_me
-    u       = speed_kp*err + integral
+    u       = speed_kp*err + integral + torque_ff
     i_q_ref = limit(u, +-i_q_max)
     integral += speed_ki*err      unless u is beyond the limit and err pushes further, or regen_limited and err brakes
 
 The limit i_q_max is what current_limit leaves beside i_d, in both modes.
 Torque mode (``speed_mode`` = 0): i_q_ref is ``i_q_ext``, limited, and the integral follows it, so that
 a change to speed mode is bumpless.  ``regen_limited``: in the last sample the bus voltage limited the braking
-current, see regeneration_limit.  ``run`` = 0: output and integral are zero.
+current, see regeneration_limit.  ``run`` = 0: output and integral are zero.  torque_ff, of a trajectory, acts in
+speed mode within the same limit; it is zero without one.
 
-Formats: err saturated to PU; proportional part rounded half up to S(9,28), which holds every product; increment
-rounded half up to S(1,28), where 2**-16 * ki still counts; the integral is kept within +-i_q_max; sum exact, rounded
-half up to PU.
+Formats: err saturated to PU; proportional part rounded half up and with torque_ff S(10,28), which holds every sum;
+increment rounded half up to S(1,28), where 2**-16 * ki still counts; the integral is kept within +-i_q_max; sum exact,
+rounded half up to PU.
 """
 
 from typing import NamedTuple
@@ -23,7 +24,7 @@ from golden_model.fixed import Format, clamp, round_half_up, saturate
 from golden_model.formats import BIT, INTEGRAL, KI, KP, PU, PU_TO_INTEGRAL, PU_W
 from golden_model.kernel import kernel
 
-PROPORTIONAL = Format(1, 9, 28)
+PROPORTIONAL = Format(1, 10, 28)
 PROPORTIONAL_W = PROPORTIONAL.width
 DROP_P = PU.frac_bits + KP.frac_bits - PROPORTIONAL.frac_bits
 DROP_I = PU.frac_bits + KI.frac_bits - INTEGRAL.frac_bits
@@ -34,9 +35,9 @@ class State(NamedTuple):
 
 
 @kernel
-def step(state, omega_ref, omega_me, i_q_ext, i_q_max, regen_limited, speed_mode, run, speed_kp, speed_ki):
+def step(state, omega_ref, omega_me, i_q_ext, i_q_max, regen_limited, speed_mode, run, torque_ff, speed_kp, speed_ki):
     err = saturate(omega_ref - omega_me, PU_W)
-    proportional = round_half_up(speed_kp * err, DROP_P)
+    proportional = round_half_up(speed_kp * err, DROP_P) + (torque_ff << PU_TO_INTEGRAL)
     moved = state.integral + round_half_up(speed_ki * err, DROP_I)
     asked = round_half_up(proportional + state.integral, PU_TO_INTEGRAL) if speed_mode else i_q_ext
     i_q_ref = clamp(asked, -i_q_max, i_q_max)
@@ -56,7 +57,7 @@ def reference(v, state):
     if not v["run"]:
         return {"i_q_ref": 0.0}
     err = PU.limit(v["omega_ref"] - v["omega_me"])
-    asked = v["speed_kp"] * err + state.integral * INTEGRAL.lsb if v["speed_mode"] else v["i_q_ext"]
+    asked = v["speed_kp"] * err + v["torque_ff"] + state.integral * INTEGRAL.lsb if v["speed_mode"] else v["i_q_ext"]
     return {"i_q_ref": min(max(asked, -v["i_q_max"]), v["i_q_max"])}
 
 
@@ -91,6 +92,10 @@ def stimuli(rng, _config):
             err, omega = (int(s * rng.integers(1, 99)) for s in ((1, -1)[k % 2], (1, -1, 1, 0)[k // 2 % 4]))
             rows.append({"omega_ref": err + omega, "omega_me": omega, **regs, "regen_limited": int(k % 3 > 0)})
     still, one = {**regs, "speed_ki": 0, "speed_mode": 1}, 1 << KP.frac_bits
+    for torque_ff in (1, -1, 5000, -5000, PU.hi, PU.lo):
+        for err in (0, 1, -1, 4000, -4000, PU.hi, PU.lo):
+            row = {**regs, "speed_mode": 1, "omega_me": 0, "omega_ref": err, "torque_ff": torque_ff}
+            rows += [row, {**row, "speed_mode": 0}, {**row, "speed_kp": KP.hi}, {**row, "i_q_max": PU.hi}]
     ends = [(PU.lo, PU.hi, PU.hi), (PU.hi, PU.lo, PU.hi)]  # the error at its own ends, shown by gains up to one
     ends += [(end + off, 0, 999) for off in range(-4, 5) for end in (999, -999)]  # the output at its limit
     for omega_ref, omega_me, i_q_max in ends:
@@ -130,6 +135,7 @@ BLOCK = Block(
         Port("regen_limited", BIT, doc="1: the bus voltage limited the braking current of the last sample"),
         Port("speed_mode", BIT, doc="1: speed control, 0: torque control"),
         Port("run", BIT, doc="0: output and integral zero"),
+        Port("torque_ff", PU, doc="added in speed mode: torque or current of a trajectory's acceleration"),
     ),
     registers=(
         Port("speed_kp", KP, doc="proportional gain"),

@@ -1,12 +1,12 @@
 -- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: speed regulator, from speed error to i_q reference, limited, with conditional integration.
 --   i_q_max is what current_limit leaves beside i_d
---   err = omega_ref - omega_me;  u = speed_kp*err + integral;  i_q_ref = limit(u, +-i_q_max)
+--   err = omega_ref - omega_me;  u = speed_kp*err + torque_ff + integral;  i_q_ref = limit(u, +-i_q_max)
 --   integral += speed_ki*err unless u is beyond the limit and err pushes further, or the bus voltage limited the braking
 --   current of the last sample (regen_limited) and err brakes
 -- Torque mode (speed_mode = 0): i_q_ref is i_q_ext, limited, and the integral follows it.
--- run = 0: output and integral are zero.
--- Formats: err PU, proportional part 28 fraction bits, integral S(1,28), output PU.
+-- run = 0: output and integral are zero.  torque_ff, of a trajectory, acts in speed mode; zero without one.
+-- Formats: err PU, proportional part with torque_ff 28 fraction bits, integral S(1,28), output PU.
 -- Latency: 5.  Interval: 5.
 -- Rounding: half up; err saturates, i_q_ref and the integral are kept within +-i_q_max.
 
@@ -28,6 +28,7 @@ entity speed_pi is
     regen_limited : in  std_logic;
     speed_mode    : in  std_logic;
     run           : in  std_logic;
+    torque_ff     : in  signed(PU_W - 1 downto 0);
     speed_kp      : in  unsigned(KP_W - 1 downto 0);
     speed_ki      : in  unsigned(KI_W - 1 downto 0);
     out_valid     : out std_logic;
@@ -41,8 +42,6 @@ architecture rtl of speed_pi is
   constant PROP_W  : positive := SPEED_PI_PROPORTIONAL_W;
   constant TOTAL_W : positive := PROP_W + 2 - PU_TO_INTEGRAL;
 
-  constant NOTHING : signed(0 downto 0) := "0";
-
   type state_t is record
     integral : signed(INTEGRAL_W - 1 downto 0);
   end record state_t;
@@ -53,6 +52,7 @@ architecture rtl of speed_pi is
   signal by_kp          : signed(KP_W downto 0);
   signal by_ki          : signed(KI_W downto 0);
   signal err_0          : signed(PU_W - 1 downto 0);
+  signal fed_forward    : signed(INTEGRAL_W - 1 downto 0);
   signal rises          : std_logic;  -- err > 0, from clock 1 on
   signal falls          : std_logic;
   signal proportional_3 : signed(PROP_W - 1 downto 0);
@@ -64,10 +64,12 @@ begin
   by_ki    <= signed('0' & speed_ki);
   err_0    <= saturate(resize(omega_ref, PU_W + 1) - omega_me, PU_W);
 
-  -- Stages 1 to 3: proportional = speed_kp*err;  moved = integral + speed_ki*err
+  fed_forward <= shift_left(resize(torque_ff, INTEGRAL_W), PU_TO_INTEGRAL);
+
+  -- Stages 1 to 3: proportional = speed_kp*err + torque_ff;  moved = integral + speed_ki*err
   proportional_part : entity work.multiply_add
     generic map (DROP => SPEED_PI_DROP_P)
-    port map (clk => clk, a => by_kp, b => err_0, c => NOTHING, y => proportional_3, limited => open);
+    port map (clk => clk, a => by_kp, b => err_0, c => fed_forward, y => proportional_3, limited => open);
 
   integral_part : entity work.multiply_add
     generic map (DROP => SPEED_PI_DROP_I)

@@ -26,6 +26,7 @@ entity board_register_file is
     CLOCK_HZ      : natural := 200000000;
     ESTIMATORS    : natural := 1;
     REFERENCES    : natural := 0;
+    POSITION_LOOP : natural := 0;
     RESIDUAL      : natural := 0;
     ENCODER       : natural := 1;
     CURRENTS      : natural := 1;
@@ -733,6 +734,66 @@ begin
         settings.torque_step <= signed(held(17 downto 0));
         written(157)         <= '1';
       end if;
+      if (row(20) and column(0) and not sample_busy) = '1' then
+        settings.position_mode <= held(0);
+        written(160)           <= '1';
+      end if;
+      if (row(20) and column(1) and not sample_busy) = '1' then
+        settings.position_target <= signed(held(31 downto 0));
+        written(161)             <= '1';
+      end if;
+      if (row(20) and column(2) and not sample_busy) = '1' then
+        settings.position_kp <= unsigned(held(23 downto 0));
+        written(162)         <= '1';
+      end if;
+      if (row(20) and column(3) and not sample_busy) = '1' then
+        settings.position_band <= unsigned(held(15 downto 0));
+        written(163)           <= '1';
+      end if;
+      if (row(20) and column(4) and not sample_busy) = '1' then
+        settings.omega_most <= signed(held(17 downto 0));
+        written(164)        <= '1';
+      end if;
+      if (row(20) and column(5) and not sample_busy) = '1' then
+        settings.move_speed <= unsigned(held(30 downto 0));
+        written(165)        <= '1';
+      end if;
+      if (row(20) and column(6) and not sample_busy) = '1' then
+        settings.move_step <= unsigned(held(30 downto 0));
+        written(166)       <= '1';
+      end if;
+      if (row(20) and column(7) and not sample_busy) = '1' then
+        settings.jerk_bits <= unsigned(held(2 downto 0));
+        written(167)       <= '1';
+      end if;
+      if (row(21) and column(0) and not sample_busy) = '1' then
+        settings.torque_lead <= unsigned(held(2 downto 0));
+        written(168)         <= '1';
+      end if;
+      if (row(21) and column(1) and not sample_busy) = '1' then
+        settings.use_stops <= held(0);
+        written(169)       <= '1';
+      end if;
+      if (row(21) and column(2) and not sample_busy) = '1' then
+        settings.stop_low <= signed(held(31 downto 0));
+        written(170)      <= '1';
+      end if;
+      if (row(21) and column(3) and not sample_busy) = '1' then
+        settings.stop_high <= signed(held(31 downto 0));
+        written(171)       <= '1';
+      end if;
+      if (row(21) and column(4) and not sample_busy) = '1' then
+        settings.k_inertia <= unsigned(held(23 downto 0));
+        written(172)       <= '1';
+      end if;
+      if (row(21) and column(5) and not sample_busy) = '1' then
+        settings.k_viscous <= unsigned(held(23 downto 0));
+        written(173)       <= '1';
+      end if;
+      if (row(21) and column(6) and not sample_busy) = '1' then
+        settings.coulomb <= signed(held(17 downto 0));
+        written(174)     <= '1';
+      end if;
       if (row(26) and column(0) and not sample_busy) = '1' then
         settings.residual_min <= unsigned(held(16 downto 0));
         written(208)          <= '1';
@@ -1151,6 +1212,21 @@ begin
         settings.table_word       <= (others => '0');
         settings.v_start          <= (others => '0');
         settings.torque_step      <= (others => '0');
+        settings.position_mode    <= '0';
+        settings.position_target  <= (others => '0');
+        settings.position_kp      <= (others => '0');
+        settings.position_band    <= (others => '0');
+        settings.omega_most       <= (others => '0');
+        settings.move_speed       <= (others => '0');
+        settings.move_step        <= (others => '0');
+        settings.jerk_bits        <= (others => '0');
+        settings.torque_lead      <= (others => '0');
+        settings.use_stops        <= '0';
+        settings.stop_low         <= (others => '0');
+        settings.stop_high        <= (others => '0');
+        settings.k_inertia        <= (others => '0');
+        settings.k_viscous        <= (others => '0');
+        settings.coulomb          <= (others => '0');
         settings.residual_min     <= (others => '0');
         settings.residual_w       <= (others => '0');
         settings.residual_i       <= (others => '0');
@@ -1354,7 +1430,7 @@ begin
       if is_written_3 = '1' then
         read_data <= std_logic_vector(resize(signed(copied_2), 32));
       elsif is_signed_1 = '1' then
-        read_data <= std_logic_vector(resize(signed(picked_3(25 downto 0)), 32));
+        read_data <= std_logic_vector(resize(signed(picked_3(31 downto 0)), 32));
       else
         read_data <= picked_3;
       end if;
@@ -1364,7 +1440,7 @@ begin
     end if;
   end process;
 
-  -- Contents of the other words, signed numbers in 26 bits; the places between are zero
+  -- Contents of the other words, signed numbers in 32 bits; the places between are zero
   shown(0)          <= x"464C5558";
   shown(1)          <= x"00000200";
   shown(2)          <= std_logic_vector(to_unsigned(ADC_BITS, 32));
@@ -1373,8 +1449,9 @@ begin
   shown(5)          <= std_logic_vector(to_unsigned(CLOCK_HZ, 32));
   shown(6)          <= std_logic_vector(to_unsigned(ESTIMATORS, 32));
   shown(7)          <= std_logic_vector(to_unsigned(REFERENCES, 32));
-  shown(8)          <= std_logic_vector(to_unsigned(RESIDUAL, 32));
-  shown(9 to 16)    <= (others => (others => '0'));
+  shown(8)          <= std_logic_vector(to_unsigned(POSITION_LOOP, 32));
+  shown(9)          <= std_logic_vector(to_unsigned(RESIDUAL, 32));
+  shown(10 to 16)   <= (others => (others => '0'));
   shown(17)         <= "0000000000000000000000000000000" & clear_trip;
   shown(18)         <= "0000000000000000000000000000000" & clear_faults_in;
   shown(19 to 26)   <= (others => (others => '0'));
@@ -1387,20 +1464,20 @@ begin
                        tripped & running;
   shown(33)         <= std_logic_vector(resize(estimated.flux_faults, 32));
   shown(34)         <= std_logic_vector(resize(min_pulse_used, 32));
-  shown(35)         <= "000000" & std_logic_vector(resize(observed.omega_me, 26));
+  shown(35)         <= "" & std_logic_vector(resize(observed.omega_me, 32));
   shown(36)         <= std_logic_vector(resize(observed.theta_me, 32));
-  shown(37)         <= "000000" & std_logic_vector(resize(observed.i_d, 26));
-  shown(38)         <= "000000" & std_logic_vector(resize(observed.i_q, 26));
-  shown(39)         <= "000000" & std_logic_vector(resize(observed.i_q_ref, 26));
+  shown(37)         <= "" & std_logic_vector(resize(observed.i_d, 32));
+  shown(38)         <= "" & std_logic_vector(resize(observed.i_q, 32));
+  shown(39)         <= "" & std_logic_vector(resize(observed.i_q_ref, 32));
   shown(40)         <= std_logic_vector(resize(observed.u_dc, 32));
-  shown(41)         <= "000000" & std_logic_vector(resize(observed.u_d, 26));
-  shown(42)         <= "000000" & std_logic_vector(resize(observed.u_q, 26));
-  shown(43)         <= "000000" & std_logic_vector(resize(estimated.torque, 26));
-  shown(44)         <= "000000" & std_logic_vector(resize(observed.lambda_d, 26));
-  shown(45)         <= "000000" & std_logic_vector(resize(observed.lambda_q, 26));
-  shown(46)         <= "000000" & std_logic_vector(resize(estimated.psi_m, 26));
-  shown(47)         <= "000000" & std_logic_vector(resize(estimated.v_dead, 26));
-  shown(48)         <= "000000" & std_logic_vector(resize(estimated.v_comp, 26));
+  shown(41)         <= "" & std_logic_vector(resize(observed.u_d, 32));
+  shown(42)         <= "" & std_logic_vector(resize(observed.u_q, 32));
+  shown(43)         <= "" & std_logic_vector(resize(estimated.torque, 32));
+  shown(44)         <= "" & std_logic_vector(resize(observed.lambda_d, 32));
+  shown(45)         <= "" & std_logic_vector(resize(observed.lambda_q, 32));
+  shown(46)         <= "" & std_logic_vector(resize(estimated.psi_m, 32));
+  shown(47)         <= "" & std_logic_vector(resize(estimated.v_dead, 32));
+  shown(48)         <= "" & std_logic_vector(resize(estimated.v_comp, 32));
   shown(49 to 49)   <= (others => (others => '0'));
   shown(50)         <= std_logic_vector(resize(telemetry_dropped, 32));
   shown(51)         <= std_logic_vector(resize(fault_flags, 32));
@@ -1417,13 +1494,16 @@ begin
   shown(74 to 98)   <= (others => (others => '0'));
   shown(99)         <= x"00000100";
   shown(100)        <= x"00001000";
-  shown(101 to 213) <= (others => (others => '0'));
-  shown(214)        <= "000000" & std_logic_vector(resize(estimated.residual_d, 26));
-  shown(215)        <= "000000" & std_logic_vector(resize(estimated.residual_q, 26));
-  shown(216)        <= "000000" & std_logic_vector(resize(estimated.residual_mean_d, 26));
-  shown(217)        <= "000000" & std_logic_vector(resize(estimated.residual_mean_q, 26));
-  shown(218)        <= "000000" & std_logic_vector(resize(estimated.residual_sixth_d, 26));
-  shown(219)        <= "000000" & std_logic_vector(resize(estimated.residual_sixth_q, 26));
+  shown(101 to 183) <= (others => (others => '0'));
+  shown(184)        <= "" & std_logic_vector(resize(observed.shaft_position, 32));
+  shown(185)        <= "" & std_logic_vector(resize(observed.position_error, 32));
+  shown(186 to 213) <= (others => (others => '0'));
+  shown(214)        <= "" & std_logic_vector(resize(estimated.residual_d, 32));
+  shown(215)        <= "" & std_logic_vector(resize(estimated.residual_q, 32));
+  shown(216)        <= "" & std_logic_vector(resize(estimated.residual_mean_d, 32));
+  shown(217)        <= "" & std_logic_vector(resize(estimated.residual_mean_q, 32));
+  shown(218)        <= "" & std_logic_vector(resize(estimated.residual_sixth_d, 32));
+  shown(219)        <= "" & std_logic_vector(resize(estimated.residual_sixth_q, 32));
   shown(220)        <= std_logic_vector(resize(estimated.residual_power, 32));
   shown(221)        <= std_logic_vector(resize(estimated.residual_sum, 32));
   shown(222 to 239) <= (others => (others => '0'));

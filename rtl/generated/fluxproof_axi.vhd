@@ -26,6 +26,7 @@ entity fluxproof_axi is
     CARRIER_HALF  : integer range 8 to 32767     := 10000;  -- half a PWM period in clocks
     ESTIMATORS    : integer range 0 to 1         := 1;  -- 0 leaves the estimators out
     REFERENCES    : integer range 0 to 1         := 0;  -- 1 builds the torque table
+    POSITION_LOOP : integer range 0 to 1         := 0;  -- 1 builds the position loop and its trajectory
     RESIDUAL      : integer range 0 to 1         := 0;  -- 1 compares the motor with its description
     RING_ROWS     : integer range 0 to 2730      := 0;  -- telemetry rows of the ring, 42 in a block RAM; 0 leaves it out
     GATE_ACTIVE   : integer range 0 to 1         := 1;  -- level of gate_high and gate_low at which a switch is on
@@ -161,6 +162,7 @@ begin
       CLOCK_HZ      => CLOCK_HZ,
       ESTIMATORS    => ESTIMATORS,
       REFERENCES    => REFERENCES,
+      POSITION_LOOP => POSITION_LOOP,
       RESIDUAL      => RESIDUAL
     )
     port map (
@@ -234,6 +236,7 @@ begin
       CARRIER_HALF  => CARRIER_HALF,
       ESTIMATORS    => ESTIMATORS,
       REFERENCES    => REFERENCES,
+      POSITION_LOOP => POSITION_LOOP,
       RESIDUAL      => RESIDUAL
     )
     port map (

@@ -89,6 +89,21 @@ package fluxproof_pkg is
     k_delay          : unsigned(RECIPROCAL_W - 1 downto 0);  -- angle of the delay in turns, per unit of speed
     i_max            : signed(PU_W - 1 downto 0);  -- limit of the current: radius of the circle of i_d and i_q references
     use_table        : std_logic;  -- 1: current references from torque_reference's table; i_q_ext is then a torque
+    position_mode    : std_logic;  -- 1: position control, over speed control
+    position_kp      : unsigned(KP_W - 1 downto 0);  -- speed per turn of position error
+    position_band    : unsigned(15 downto 0);  -- largest position error that is left at rest
+    omega_most       : signed(PU_W - 1 downto 0);  -- largest speed reference of the position regulator
+    position_target  : signed(31 downto 0);  -- position to go to, turns of the shaft
+    move_speed       : unsigned(30 downto 0);  -- largest speed of the trajectory, turns per sample
+    move_step        : unsigned(30 downto 0);  -- largest change of its speed in 8*2**jerk_bits samples
+    jerk_bits        : unsigned(2 downto 0);  -- the acceleration builds up in 8*2**jerk_bits samples
+    use_stops        : std_logic;  -- 1: the target is kept within stop_low and stop_high
+    stop_low         : signed(31 downto 0);  -- soft end stop, turns of the shaft
+    stop_high        : signed(31 downto 0);  -- soft end stop, turns of the shaft
+    torque_lead      : unsigned(2 downto 0);  -- samples by which torque_ff precedes the position
+    k_inertia        : unsigned(23 downto 0);  -- torque, or current, per turn and square of a sample
+    k_viscous        : unsigned(KP_W - 1 downto 0);  -- torque, or current, of viscous friction per turn and sample
+    coulomb          : signed(PU_W - 1 downto 0);  -- torque, or current, of Coulomb friction
     speed_kp         : unsigned(KP_W - 1 downto 0);  -- proportional gain
     speed_ki         : unsigned(KI_W - 1 downto 0);  -- integral gain times sample time
     regen_start      : unsigned(DUTY_W - 1 downto 0);  -- bus voltage from which the braking current is limited
@@ -215,6 +230,8 @@ package fluxproof_pkg is
     brake_asked        : std_logic;  -- 1: the bus asks for the brake resistor
     speed_was_given    : std_logic;  -- 1: omega_me of this sample was measured elsewhere
     position_restarted : std_logic;  -- 1: the code of this sample had nothing to do with the one before
+    shaft_position     : signed(31 downto 0);  -- position, turns of the shaft
+    position_error     : signed(V_LEG_W - 1 downto 0);  -- following error, turns of the shaft
     code_a             : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase a
     code_b             : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase b
     code_c             : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase c
@@ -417,6 +434,31 @@ package fluxproof_pkg is
   constant DECOUPLING_LATENCY : positive := 2;
   constant DECOUPLING_DROP : natural := 16;
 
+  -- position_control: none: docs/position.md
+  constant POSITION_CONTROL_LATENCY : positive := 7;
+  constant POSITION_CONTROL_SUM_W : natural := 38;
+  constant POSITION_CONTROL_DROP_P : natural := 6;
+  constant POSITION_CONTROL_POSITION_W : natural := 32;
+  constant POSITION_CONTROL_ERROR_W : natural := 18;
+
+  -- position_plan: none: docs/position.md
+  constant POSITION_PLAN_LATENCY : positive := 20;
+  constant POSITION_PLAN_WAY_W : natural := 58;
+  constant POSITION_PLAN_SMALL : natural := 26;
+  constant POSITION_PLAN_AHEAD_W : natural := 52;
+  constant POSITION_PLAN_PROFILE_W : natural := 35;
+
+  -- position_trajectory: none: docs/position.md
+  constant POSITION_TRAJECTORY_LATENCY : positive := 36;
+  constant POSITION_TRAJECTORY_V_DROP : natural := 8;
+  constant POSITION_TRAJECTORY_A_DROP : natural := 2;
+  constant POSITION_TRAJECTORY_FACTOR_W : natural := 34;
+  constant POSITION_TRAJECTORY_DROP_OMEGA : natural := 20;
+  constant POSITION_TRAJECTORY_DROP_TORQUE : natural := 30;
+  constant POSITION_TRAJECTORY_DROP_VISCOUS : natural := 36;
+  constant POSITION_TRAJECTORY_DROP_ERROR : natural := 6;
+  constant POSITION_TRAJECTORY_DROP_FILTER : natural := 10;
+
   -- regeneration_limit: none: protection of the bus, docs/faults.md
   constant REGENERATION_LIMIT_LATENCY : positive := 1;
   constant REGENERATION_LIMIT_SLOPE_W : natural := 16;
@@ -426,7 +468,7 @@ package fluxproof_pkg is
   constant SPEED_PI_LATENCY : positive := 5;
   constant SPEED_PI_DROP_P : natural := 4;
   constant SPEED_PI_DROP_I : natural := 12;
-  constant SPEED_PI_PROPORTIONAL_W : natural := 38;
+  constant SPEED_PI_PROPORTIONAL_W : natural := 39;
 
   -- torque_reference: none: docs/speed_range.md
   constant TORQUE_REFERENCE_LATENCY : positive := 42;

@@ -21,6 +21,7 @@ GENERICS = {
     "CLOCK_HZ": 200000000,
     "ESTIMATORS": 1,
     "REFERENCES": 0,
+    "POSITION_LOOP": 0,
     "RESIDUAL": 0,
 }  # as in the core
 BOARD_GENERICS = {"ENCODER": 1, "CURRENTS": 1, "SPI_LINES": 4}

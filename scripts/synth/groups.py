@@ -43,6 +43,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "current_circle",
         "references",
         "table_current",
+        "position_regulator",
+        "trajectory",
         "speed_regulator",
         "regeneration",
         "current_regulators",

@@ -28,6 +28,22 @@ def view():
     return view_of(recorded(), NOMINAL)
 
 
+def test_an_angle_may_be_a_row_late_and_currents_not(view):
+    """It was told as a delay of the voltage, and a winding of which the resistance rises by two thirds."""
+    too_large, row = CATALOGUE["sampling_skew"].too_large, view.sample_time_s
+    assert not too_large({"tau": 0.0, "angle": -row}, view) and too_large({"tau": 0.0, "angle": -2.0 * row}, view)
+    assert too_large({"tau": 0.5 * row, "angle": 0.0}, view) and not too_large({"tau": 0.2 * row}, view)
+
+
+@pytest.mark.slow
+def test_an_angle_that_is_a_row_late_is_the_sampling_instant():
+    table = dict(columns(GRID))
+    table["theta_e"] = np.concatenate([table["theta_e"][:1], table["theta_e"][:-1]])
+    answer = diagnose(from_columns(table, NOMINAL.sample_time_s), NOMINAL)
+    assert {e.name for e in answer.effects} == {"sampling_skew"}, answer.sentence
+    assert answer.effects[0].parameters["skew_s"].value == pytest.approx(NOMINAL.sample_time_s, rel=0.02)
+
+
 def test_resistance_does_not_fall_with_speed():
     possible, sure = CATALOGUE["resistance"].possible, np.diag([1e-6, 1e-6])
     assert possible({"delta_r": -0.2}, sure[:1, :1], NOMINAL) and possible({"delta_r": 0.1, "skin": 0.1}, sure, NOMINAL)

@@ -5,9 +5,14 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from cocotb_tests.support.drives import PAPER
+from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.decide.ambiguity import alternatives, ambiguities
+from fluxproof.diagnosis.decide.names import names_of
+from fluxproof.diagnosis.ground.nominal import load_nominal
 
 
 def kept(*sets) -> list:
@@ -42,6 +47,30 @@ def test_effects_of_which_either_will_do_are_ambiguous():
 )
 def test_what_is_no_ambiguity(sets, beyond):
     assert groups(sets, beyond=beyond) == ()
+
+
+def test_an_alternative_without_a_size_is_left_out():
+    """A saturated machine was one of 18 causes, of which eight had sizes such as 0.6 +- 1.9 us."""
+    nominal = load_nominal(PAPER)
+    view = SimpleNamespace(nominal=nominal, has_voltage=np.ones(1, bool), shaft=np.array(["driving"]))
+    setup = SimpleNamespace(effects=CATALOGUE, view=view)
+    keys = {"resistance": "delta_r", "magnet_flux": "delta_psi_m", "delay": "tau"}
+    values = {"resistance": (0.3, 0.01), "magnet_flux": (0.01, 0.001), "delay": (6e-7, 1.9e-6)}
+
+    def fit(*names):
+        problem = SimpleNamespace(setup=setup, view=view, keys=[(n, keys[n]) for n in names])
+        cov = np.diag([values[n][1] ** 2 for n in names])
+        c = {n: {keys[n]: values[n][0]} for n in names}
+        places = {n: [k] for k, n in enumerate(names)}
+        return SimpleNamespace(problem=problem, names=names, c=c, cov=cov, places=places)
+
+    weights = [(0.5, fit("resistance")), (0.3, fit("magnet_flux")), (0.2, fit("delay", "magnet_flux"))]
+    present = {"resistance": 0.5, "magnet_flux": 0.5, "delay": 0.2}
+    posterior = SimpleNamespace(
+        weights=lambda: weights, best=lambda: weights[0][1], present=lambda: present, setup=setup
+    )
+    found = names_of(posterior)
+    assert found.ambiguous == (("magnet_flux", "resistance"),) and found.possible == {"delay": 0.2}
 
 
 def test_groups_are_connected():

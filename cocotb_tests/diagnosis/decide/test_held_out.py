@@ -48,6 +48,9 @@ def test_what_is_too_small_to_act_on_makes_no_verdict_and_hides_no_cause(name):
         assert (name in found.minor) is (times < 1.0) and name not in found.only_possible(fit)
         either = relevant_names(Names({}, ((name, "dead_time"),), {}, fits=((1.0, fit),)), fit)
         assert either.ambiguous == ((name, "dead_time"),)  # one of them is large
+        little = SimpleNamespace(problem=problem, names=("dead_time",), c={"dead_time": {"v_0.02": 1e-6}})
+        both = Names({}, ((name, "dead_time"),), {}, fits=((0.6, fit), (0.4, little)))
+        assert not relevant_names(both, fit).ambiguous  # nothing large is not improbable
 
 
 def test_a_mean_torque_counts_beside_the_noise_of_its_ripple(monkeypatch):

@@ -118,6 +118,18 @@ def test_one_probe_that_rests_and_spins_up(tmp_path):
     assert found(answer) == {"magnet_flux_wb": pytest.approx(0.9 * PSI, rel=0.003)}
 
 
+def test_one_probe_at_a_wandering_speed_shows_no_harmonic(tmp_path):
+    """7.1 samples of a turn show order 13 beside the fundamental; the blocks of a window are one observation."""
+    rate, rng = 500.0, np.random.default_rng(4)
+    t = np.arange(round(20 * rate)) / rate
+    wander = np.convolve(rng.standard_normal(len(t)), np.hanning(100), "same")
+    omega = 440.0 * (1.0 + 0.01 * wander / wander.std())
+    theta = np.cumsum(omega) / rate
+    u = np.sqrt(3) * PSI * omega * np.cos(theta) + 0.02 * rng.standard_normal(len(t))
+    answer = answer_of(tmp_path, {"t": t, "u_ab": u})
+    assert answer.verdict == "no_mismatch" and not answer.minor and not answer.remainder
+
+
 def test_one_probe_of_noise_is_refused(tmp_path):
     t = np.arange(4000) / 500.0
     with pytest.raises(RecordingError, match="no sine wave|samples of an electrical turn"):

@@ -34,7 +34,8 @@ DRIVE = dataclasses.replace(DRIVE, machine=dataclasses.replace(DRIVE.machine, re
 SET = registers(DRIVE)
 FIELDS = fluxproof.Observed._fields
 LIMITS = ("t_max", "i_max", "v_comp_max", "delta_max", "v_thr", "i_learn")
-SILENT = ("omega_given", "dead_time", "t_min", "v_comp_max")  # without influence on the recorded signals
+# Without influence on the recorded signals
+SILENT = ("omega_given", "dead_time", "charge_samples", "t_min", "v_comp_max")
 SILENT += ("watchdog", "i_trip", "sum_trip", "rail_samples", "u_dc_min", "u_dc_max", "jump_max", "fault_ignore")
 SILENT += ("omega_trip", "omega_away", "runaway_samples", "omega_stall", "stall_samples", "i_open", "offset_max")
 SILENT += ("heartbeat", "brake_off", "emf_min", "emf_l", "emf_i", "emf_w", "emf_samples", "regen_start")

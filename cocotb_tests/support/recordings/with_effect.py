@@ -33,7 +33,8 @@ TURNS = np.exp(-2j * np.pi / 3 * np.arange(3))
 def healthy():
     """(columns, view of all rows) of the healthy drive with a torque transducer and a winding that warms up."""
     table = dict(columns(PLAN))
-    count = len(table["t"])
+    count = (len(table["t"]) - 1) // ROWS * ROWS + 1  # whole blocks: the effect is in every row, to the last
+    table = {name: values[:count] for name, values in table.items()}
     table |= {"temp_winding": np.linspace(20.0, WARM_C, count), "torque": np.zeros(count)}
     view = all_rows(table)
     table["torque"] = at_samples(shaft_torque(view, view), count)
@@ -44,7 +45,7 @@ def healthy():
 def all_rows(table):
     """All rows as consecutive blocks, the transients too, so that the effect is in every row."""
     template = view_of(from_columns(table, T), NOMINAL)
-    first = np.arange(0, len(table["t"]) - ROWS, ROWS)
+    first = np.arange(0, len(table["t"]) - 1, ROWS)
     at = first[:, None] + np.arange(ROWS + 1)
     theta = np.unwrap(table["theta_e"])
     i_raw = (2 / 3) * np.stack([table[f"i_{x}"] for x in "abc"], axis=1) @ np.conj(TURNS)

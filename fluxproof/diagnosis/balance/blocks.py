@@ -241,6 +241,10 @@ def _cut(recording, nominal, run, i_s, omega, block_rows):
             "current and speed are steady: record longer operating points"
         )
     dwell = _dwells(starts, run, i_s, omega, scale, length)
+    if "windows" in recording.meta:  # blocks of one fit are one observation (ingest/emf_probe.py)
+        number = np.searchsorted(recording.meta["windows"], recording["t"][starts + length // 2], side="right")
+        keep = np.unique(number, return_index=True)[1]
+        starts, dwell = starts[keep], dwell[keep]
     if len(starts) > MOST_BLOCKS:
         keep = np.unique(np.linspace(0, len(starts) - 1, MOST_BLOCKS).round().astype(int))
         starts, dwell = starts[keep], dwell[keep]

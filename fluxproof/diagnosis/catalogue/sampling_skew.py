@@ -14,10 +14,13 @@ from fluxproof.diagnosis.effects import (
     one,
     zero_vector_slope,
 )
+from fluxproof.plant.transforms import linear_limit
 
 TRIED, FINE = np.arange(-12, 13) / 50, 0.001  # periods after the valley
 NEAR = 0.1  # periods between a skew and that of its ripple
 STEP = 0.002  # periods on both sides of an instant, over which the slope of the ripple is taken
+CLASS = 0.003  # of rated current
+ROW = 1.5  # periods by which an angle may be late: a column that is written a row later than the others
 RIPPLE = 0.1  # share by which the ripple may be wrong: a filter of the currents rounds it
 # Weights of the coefficients in the time by which the currents are later than the angle.
 WEIGHTS = {"tau": 1.0, "pulses": 1.0, "shift": 1.0, "filter": 0.0, "angle": -1.0}
@@ -72,13 +75,22 @@ class SamplingSkew(MeasurementError, FreeCurve, Alternatives):
     def floor(self, nominal):
         return 0.0012 * nominal.sample_time_s
 
+    def relevant(self, nominal):
+        """By which the slope that the EMF gives the currents is the error of a sensor of class 0.3."""
+        m = nominal.machine
+        slope = linear_limit(nominal.inverter.dc_bus_v) / m.inductance_q_h
+        return max(super().relevant(nominal), CLASS * m.rated_current_a / slope)
+
     def ceiling(self, nominal):
         return 0.3 * nominal.sample_time_s
 
     def too_large(self, c, view):
-        """The ripple is that of another instant: its columns fit something else."""
+        """The ripple is that of another instant: its columns fit something else; an angle may be a row late."""
         at = (c.get("pulses", 0.0) + c.get("shift", 0.0)) / view.sample_time_s
-        return bool(c.get("pulses") and abs(at - view.memo["off_valley"]) > NEAR) or super().too_large(c, view)
+        if c.get("pulses") and abs(at - view.memo["off_valley"]) > NEAR:
+            return True
+        currents = {**c, "angle": 0.0}
+        return abs(c.get("angle", 0.0)) > ROW * view.sample_time_s or super().too_large(currents, view)
 
     def doubt(self, c, view):
         seen = current_error(view, self._pulses(c, view))["u"]

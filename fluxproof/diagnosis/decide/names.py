@@ -17,6 +17,7 @@ from fluxproof.diagnosis.balance.shaft import measures_torque
 from fluxproof.diagnosis.decide.ambiguity import ambiguities
 from fluxproof.diagnosis.decide.credibility import credibilities
 from fluxproof.diagnosis.decide.estimates import estimates_in
+from fluxproof.diagnosis.decide.sized import has_size
 from fluxproof.diagnosis.effects.constant import Constant
 from fluxproof.diagnosis.effects.drive_file import Restates
 from fluxproof.diagnosis.ground import constants as k
@@ -68,7 +69,8 @@ def names_of(posterior) -> Names:
     sure = {n: p for n, p in present.items() if p >= 1.0 - k.DOUBTED and n in best.names}
     named = {n: p for n, p in sure.items() if effects[n].named}
     suspects = _no_imitations({n: p for n, p in sure.items() if not effects[n].named}, best)
-    groups = tuple(_with_what_depends(g, named, kept) for g in ambiguities(kept, present, sure, effects))
+    sized = {n: p for n, p in present.items() if _has_a_size(n, effects[n], kept)}
+    groups = tuple(_with_what_depends(g, named, kept) for g in ambiguities(kept, sized, sure, effects))
     twins = [n for n in named if _has_a_twin(n, effects, groups)]
     if twins and not measures_torque(posterior.setup.view):  # which a wrong current changes, and a wrong nameplate not
         groups += tuple(_with_its_twin(n, effects[n], best.c[n]) for n in twins)
@@ -79,6 +81,16 @@ def names_of(posterior) -> Names:
     grouped = {n for g in groups for n in g}
     possible = {n: p for n, p in present.items() if n not in sure and n not in grouped and p >= k.PRESENT}
     return Names(named, groups, possible, suspects, tuple(kept))
+
+
+def _has_a_size(name, effect, kept) -> bool:
+    """Whether an effect has a size in any probable set: one that has none explains nothing, and is no alternative.
+
+    Of 18 alternatives for a saturated machine, eight stood beside a cause without explaining a part.
+    """
+    fits = [fit for _, fit in kept if name in fit.names]
+    nominal = fits[0].problem.view.nominal
+    return any(has_size(estimates_in(fit, name), effect, fit.c[name], nominal) for fit in fits)
 
 
 def _no_imitations(suspects, fit) -> dict[str, float]:

@@ -21,6 +21,7 @@ from golden_model import drive
 from golden_model.drive_file import read_sections, read_tables
 from golden_model.drive_keys import DriveError, key_of
 from golden_model.front_ends import Converters, Encoder
+from golden_model.motion import Position
 from golden_model.supply import Supply
 
 
@@ -97,6 +98,7 @@ class Nominal:
     encoder: Encoder
     converters: Converters
     supply: Supply
+    position: Position
     columns: dict = field(default_factory=dict)
     path: str = ""
     plant: dict = field(default_factory=dict)

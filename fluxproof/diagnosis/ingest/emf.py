@@ -42,7 +42,7 @@ def emf_rows(path, columns: dict, nominal, meta: dict) -> Recording:
         if not np.isfinite(columns[name]).all():
             row = int(np.argmin(np.isfinite(columns[name])))
             raise RecordingError(f"{path}: row {row}: the terminal voltage {name} must be a number")
-    recorded, columns = columns, _dense(path, columns)
+    recorded, (columns, windows) = columns, _dense(path, columns)
     t, v = columns["t"], _space_vector(columns)
     problems = []
     if "theta_e" not in columns:
@@ -62,6 +62,8 @@ def emf_rows(path, columns: dict, nominal, meta: dict) -> Recording:
     joined[np.cumsum(count) - 1] = False
     lacks = LACKS if "theta_e" in columns else LACKS | {"angle"}
     meta["notes"] += _notes(recorded, columns is not recorded, period)
+    if len(windows):
+        meta["windows"] = windows
     if len(count) > 1:
         meta["run"] = np.repeat(np.arange(len(count)), count)
     return Recording(str(path), arrays, usable, joined, lacks=lacks, problems=problems, meta=meta)
@@ -120,11 +122,14 @@ def _turning_as_recorded(v, t, columns, problems):
     return np.conj(v)
 
 
-def _dense(path, columns) -> dict:
-    """The columns as they are, or with voltages from a fit where a voltage or samples are too few."""
+def _dense(path, columns) -> tuple[dict, np.ndarray]:
+    """The columns as they are, or with voltages from fits of windows where a voltage or samples are too few.
+
+    With the times at which the windows begin, none of columns as they are.
+    """
     if has_terminal_voltages(columns) and _per_turn(_space_vector(columns)) >= LEAST_PER_TURN:
-        return columns
-    return from_fit(path, columns, _pieces(columns["t"]))[0]
+        return columns, np.zeros(0)
+    return from_fit(path, columns, _pieces(columns["t"]))
 
 
 def _per_turn(v) -> float:

@@ -7,9 +7,10 @@ Without current a terminal voltage is the speed times a periodic function of the
 
 so that samples of many turns, folded on the angle, show a turn in full, also at two and a half samples a turn.  phi
 follows from the recording alone: the largest line of its spectrum in short segments, then the phase of the
-fundamental.  The c_k are fitted anew in windows of TURNS turns, so that their scatter is what noise does.  Phases that
-were not probed are those that were, a third of a turn later: of a machine whose phases are alike the same, of any
-other its mean.
+fundamental.  The c_k are fitted anew in windows of TURNS turns, so that their scatter is what noise does; a window is
+one observation, of which one block is enough.  Orders that the samples show at the same frequency as a lower one are
+not fitted: what a wandering speed leaves of the fundamental would be told as a harmonic.  Phases that were not probed
+are those that were, a third of a turn later: of a machine whose phases are alike the same, of any other its mean.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ TURNS = 8  # of a window in which the shape is fitted
 SHORTEST = 3.0  # turns of a stretch that is fitted
 SEGMENT = 64  # least samples of a spectrum
 ROWS = 3.0  # samples per fitted number
-ILL = 30.0  # condition number at which a harmonic is an alias of another
-DENSE = 24  # samples of a turn that are made
+APART = 0.5  # orders between the frequencies at which the samples show two harmonics; nearer ones are aliases
+DENSE = 8  # samples of a period of the highest order that are made
 ORDERS = {LINE_VOLTAGES: (1, 5, 7, 11, 13), PHASE_VOLTAGES: (1, 3, 5, 7, 9, 11, 13)}
 LEFT = 0.5  # of the voltage that a fit may leave: with more there is no sine wave
 POOR = 2.0  # times what the median window leaves: the speed jumps in it
@@ -45,8 +46,8 @@ def probed(columns: dict) -> tuple[str, ...]:
     return ()
 
 
-def from_fit(path, columns: dict, pieces: list[tuple[int, int]]) -> tuple[dict, float]:
-    """(columns at a dense time with all three voltages from fits, samples of an electrical turn before).
+def from_fit(path, columns: dict, pieces: list[tuple[int, int]]) -> tuple[dict, np.ndarray]:
+    """(columns at a dense time with all three voltages from fits, times (w,) at which a window begins).
 
     columns: canonical arrays (n,) with t; pieces: (begin, end) of the parts without a gap.
     Raises RecordingError if no piece has SHORTEST turns with LEAST_PER_TURN samples.
@@ -74,7 +75,7 @@ def from_fit(path, columns: dict, pieces: list[tuple[int, int]]) -> tuple[dict, 
     made |= {name: values[k] for k, name in enumerate(names)}
     others = [name for name in columns if name not in (*LINE_VOLTAGES, *PHASE_VOLTAGES, "t")]
     made |= {name: np.interp(made["t"], columns["t"], columns[name]) for name in others}
-    return made, float(np.median(per_turn))
+    return made, np.concatenate([p[2] for p in parts])
 
 
 def _too_little(per_turn: list[float], found: tuple[str, ...]) -> str:
@@ -158,12 +159,12 @@ def _windows(phi, turns: float) -> list[tuple[int, int]]:
 
 
 def _made(t, u, phi, orders, places, backward: bool):
-    """(times (m,), three voltages (3, m)) of the fits of u (count, n), at DENSE samples of the fastest turn.
+    """(times (m,), three voltages (3, m), beginnings of the windows (w,)) of the fits of u (count, n).
 
     Windows whose fit is poor are left out, so that there is a gap in their place; None if the median one is no sine.
     """
     omega = np.gradient(phi, t)
-    step = min(float(np.median(np.diff(t))), 2 * np.pi / DENSE / float(omega.max()))
+    step = min(float(np.median(np.diff(t))), 2 * np.pi / (DENSE * orders[-1]) / float(omega.max()))
     at = t[0] + step * np.arange(int((t[-1] - t[0]) / step) + 1)
     angle, fast = np.interp(at, t, phi), np.interp(at, t, omega)
     third = float(np.angle(AXES[1])) * (-1 if backward else 1)
@@ -181,22 +182,30 @@ def _made(t, u, phi, orders, places, backward: bool):
             later = 0.0 if k in places else third * (k - places[0])
             out[k, inside] = _value(shape, angle[inside] - later) * fast[inside]
     known = np.isfinite(out[0])
-    return at[known], out[:, known]
+    return at[known], out[:, known], t[[a for a, _ in windows]]
 
 
 def _fit(phi, speed, u, orders) -> tuple[dict[int, complex], float]:
     """({order: c [V s]}, share that is left) of one window, of as many orders as its samples can tell apart."""
-    orders = list(orders)
-    while True:
-        waves = np.exp(1j * np.outer(phi, orders)) * speed[:, None]
-        basis = np.concatenate([waves.real, -waves.imag, np.full((len(phi), 1), speed.mean())], axis=1)
-        enough = len(phi) >= ROWS * basis.shape[1] and np.linalg.cond(basis) < ILL
-        if enough or len(orders) == 1:
-            c = np.linalg.lstsq(basis, u, rcond=None)[0]
-            m, free = len(orders), max(len(u) - basis.shape[1], 1)
-            rest = float(np.linalg.norm(u - basis @ c) / np.sqrt(free) / max(np.std(u), 1e-30))
-            return {order: complex(c[k], c[m + k]) for k, order in enumerate(orders)}, rest
-        orders.pop()
+    orders = _told_apart(orders, 2 * np.pi * (len(phi) - 1) / (phi[-1] - phi[0]))
+    orders = orders[: max(int((len(phi) / ROWS - 1) / 2), 1)]
+    waves = np.exp(1j * np.outer(phi, orders)) * speed[:, None]
+    basis = np.concatenate([waves.real, -waves.imag, np.full((len(phi), 1), speed.mean())], axis=1)
+    c = np.linalg.lstsq(basis, u, rcond=None)[0]
+    m, free = len(orders), max(len(u) - basis.shape[1], 1)
+    rest = float(np.linalg.norm(u - basis @ c) / np.sqrt(free) / max(np.std(u), 1e-30))
+    return {order: complex(c[k], c[m + k]) for k, order in enumerate(orders)}, rest
+
+
+def _told_apart(orders, per_turn: float) -> list[int]:
+    """The orders that ``per_turn`` samples of a turn show at another frequency than the mean and every lower order."""
+    kept, seen = [], [0.0]
+    for order in orders:
+        at = abs(order - per_turn * round(order / per_turn))
+        if order == 1 or all(abs(at - other) >= APART for other in seen):
+            kept.append(order)
+            seen.append(at)
+    return kept
 
 
 def _value(shape: dict[int, complex], phi) -> np.ndarray:

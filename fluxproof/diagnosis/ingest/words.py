@@ -120,8 +120,8 @@ def _words(stem: str) -> list[str]:
     """The words of a name in lower case, the last part of a path; of "MotorSpeed" two."""
     last = re.split(r"[./]", stem)[-1]
     apart = re.sub(r"(?<=[a-z])(?=[A-Z][a-z])|(?<=[A-Z])(?=[A-Z][a-z]{2})", " ", last)
-    words = re.findall(r"[^\W_]+", apart.lower())
-    return " ".join(JOINED[word] if word in JOINED else word for word in words).split()
+    words: list[str] = re.findall(r"[^\W_]+", apart.lower())
+    return " ".join(JOINED.get(word, word) for word in words).split()
 
 
 def _unit_of(name: str, unit: str, words: list[str]) -> str | None:

@@ -58,6 +58,10 @@ def replay(recording: Recording) -> tuple[Digital, list[str]]:
         return Digital(), [f"The digital part was not checked: register {lacking[0]} is not in the recording."]
     if meta["config"].get("references", 0) and meta["registers"]["use_table"]:
         return Digital(), ["The digital part was not checked: the recording does not hold the core's torque table."]
+    if meta["config"].get("position_loop", 0) and meta["registers"]["position_mode"]:
+        return Digital(), [
+            "The digital part was not checked: the recording does not hold the targets of position mode."
+        ]
     observed = meta.get("observed") or _duties(recording, meta["config"])
     if not observed:
         return Digital(), [

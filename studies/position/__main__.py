@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``make position``: every figure of the position loop as build/studies/position.json, and in the terminal."""
+
+from __future__ import annotations
+
+import sys
+
+from fluxproof.checkout import BUILD
+from fluxproof.cosim.runs import InVerilator, Named
+from fluxproof.files import write_json
+from studies.position import figures
+
+PERIODS, CARRIER_HALF = 3000, 128  # of the comparison with the RTL
+
+
+def rtl() -> list[dict]:
+    """The RTL against the golden core in all modes."""
+    job = InVerilator("position_modes", Named("studies.position.drives:all_modes", (CARRIER_HALF, PERIODS)))
+    job.carry_out()
+    said = job.summary()
+    different = said.get("differences", PERIODS) if job.problem else 0
+    return [
+        figures.row("RTL, all modes", f"differences in {PERIODS} periods", different, 0, "1"),
+        figures.row("RTL, all modes", "clocks from sample to duties", said.get("sample_to_duty_clocks", 99), 39, "1"),
+    ]
+
+
+def main() -> int:
+    """All figures; exit status 1 where one misses its target."""
+    rows = []
+    for found in (figures.all_figures(), rtl()):
+        for one in found:
+            rows.append(one)
+            mark = "ok  " if one["pass"] else "MISS"
+            target = "" if one["target"] == float("inf") else f" (target {one['target']:g})"
+            print(f"{mark} {one['experiment']}: {one['figure']}: {one['ours']:.4g} {one['unit']}{target}", flush=True)
+    told = [{**one, "target": None if one["target"] == float("inf") else one["target"]} for one in rows]
+    write_json(BUILD / "studies" / "position.json", told)
+    missed = sum(not one["pass"] for one in rows)
+    print(f"{len(rows) - missed} of {len(rows)} figures reached")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
