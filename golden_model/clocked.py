@@ -20,7 +20,7 @@ INTERVAL = fluxproof.SAMPLE_INTERVAL
 DUE = {
     name: (fluxproof.schedule()[name][1], fluxproof.outputs_of(name))
     for name in ("checks", "chopper", "zero_check", "motion", "emf", "load", "compare")
-}
+} | {"residual": (fluxproof.schedule()["residual"][1], ("motor_differs",))}
 CHECKS_CLOCKS = DUE["checks"][0]
 
 
@@ -56,6 +56,7 @@ class Inputs(NamedTuple):
     motion_faults: int = 0
     open_load: int = 0
     encoder_lost: int = 0
+    motor_differs: int = 0  # read by interrupts, beside the core
     brake_asked: int = 0
     compare_a: int = 0
     compare_b: int = 0

@@ -241,6 +241,12 @@ def _protection(drive):
         _refuse("[protection] watchdog_periods", p.watchdog_periods, "above 1; trip_watchdog = false ignores it")
 
 
+def _residual(drive):
+    """The residual takes the voltage of a period from the estimators."""
+    if drive.core.residual and not drive.core.estimators:
+        raise DriveError("[core] residual = true needs estimators = true")
+
+
 def _regeneration(drive):
     """As the bus rises: the chopper first, then the line that limits the braking current, the trip last."""
     p, bus = drive.protection, drive.inverter.dc_bus_v
@@ -262,6 +268,6 @@ def _regeneration(drive):
 
 RULES = (
     _sample_time, _sampling, _carrier, _pulses, _low_side, _samples_per_turn, _voltage, _current, _flux, _codes,
-    _speed_loop, _current_loop, _flux_loop, _adaline_steps, _protection, _regeneration, check_encoder, check_converters,
-    check_position,
+    _speed_loop, _current_loop, _flux_loop, _adaline_steps, _protection, _regeneration, _residual,
+    check_encoder, check_converters, check_position,
 )  # fmt: skip

@@ -16,6 +16,7 @@ from golden_model.estimators import (
     flux_compensation,
     flux_merge,
     flux_monitor,
+    motor_residual,
     psi_adaline,
     speed_reciprocal,
     torque,
@@ -24,6 +25,8 @@ from golden_model.estimators import (
 )
 from golden_model.kernel import kernel
 from golden_model.transforms import flux_inverse_park, flux_park, park
+
+NO_RESIDUAL = (0,) * len(motor_residual.OUTPUTS)
 
 
 class State(NamedTuple):
@@ -48,6 +51,7 @@ class State(NamedTuple):
     v_leg: int = 0
     s_alpha: int = 0
     s_beta: int = 0
+    of_motor_residual: motor_residual.State = motor_residual.State()
 
 
 class ForControl(NamedTuple):
@@ -68,6 +72,9 @@ class ForControl(NamedTuple):
 class Seen(NamedTuple):
     """What the control knows of the sample when the estimators work; names as in fluxproof.step."""
 
+    i_a: int
+    i_b: int
+    i_c: int
     i_alpha: int
     i_beta: int
     i_d: int
@@ -120,6 +127,15 @@ class Estimated(NamedTuple):
     psi_m: int = 0
     psi_held: int = 0
     temp_lost: int = 0
+    residual_d: int = 0
+    residual_q: int = 0
+    residual_mean_d: int = 0
+    residual_mean_q: int = 0
+    residual_sixth_d: int = 0
+    residual_sixth_q: int = 0
+    residual_power: int = 0
+    residual_sum: int = 0
+    motor_differs: int = 0
 
 
 @kernel
@@ -132,6 +148,7 @@ def kept(state):
         of_clean_voltage=s.of_clean_voltage, lambda_m_alpha=s.lambda_m_alpha, lambda_m_beta=s.lambda_m_beta,
         merge_known=s.merge_known, lambda_pi_d=s.lambda_pi_d, lambda_pi_q=s.lambda_pi_q, lambda_add_d=s.lambda_add_d,
         lambda_add_q=s.lambda_add_q, v_comp=s.v_comp, v_leg=s.v_leg, s_alpha=s.s_alpha, s_beta=s.s_beta,
+        of_motor_residual=s.of_motor_residual,
     )  # fmt: skip
 
 
@@ -153,11 +170,11 @@ def for_control(state, sample, regs, cos_theta, sin_theta, cos_out, sin_out):
 
 
 @kernel
-def step(state, given, seen, sample, regs, carrier_half):
+def step(state, given, seen, sample, regs, config):
     """One control period: (State, Estimated); ``state``: fluxproof.State, ``given``: ForControl, ``seen``: Seen."""
     g, v, x, r = given, seen, sample, regs
     u_applied_alpha, u_applied_beta, voltage_known = applied_voltage.step(
-        state.compare_a, state.compare_b, state.compare_c, v.u_dc, v.u_dc_at_rail, x.run, carrier_half
+        state.compare_a, state.compare_b, state.compare_c, v.u_dc, v.u_dc_at_rail, x.run, config.carrier_half
     )
     clean_state, (u_clean_alpha, u_clean_beta) = clean_voltage.step(
         state.of_clean_voltage, u_applied_alpha, u_applied_beta, state.s_alpha, state.s_beta, state.v_leg
@@ -212,12 +229,28 @@ def step(state, given, seen, sample, regs, carrier_half):
         r,
     )  # fmt: skip
 
+    residual_state, residual = state.of_motor_residual, NO_RESIDUAL
+    if config.residual:
+        residual_state, residual = motor_residual.step(
+            state.of_motor_residual,
+            motor_residual.Inputs(
+                model_d=v.model_d, model_q=v.model_q, cos_theta=v.cos_theta, sin_theta=v.sin_theta, i_a=v.i_a,
+                i_b=v.i_b, i_c=v.i_c, i_alpha=v.i_alpha, i_beta=v.i_beta, i_d=v.i_d, i_q=v.i_q, omega_me=v.omega_me,
+                u_applied_alpha=u_applied_alpha, u_applied_beta=u_applied_beta, s_alpha=state.s_alpha,
+                s_beta=state.s_beta, rho=g.rho, sat_d=state.sat_d, sat_q=state.sat_q, voltage_known=voltage_known,
+                current_at_rail=v.current_at_rail, run=x.run,
+            ),
+            r,
+        )  # fmt: skip
+    mean_d, mean_q, sixth_d, sixth_q = residual[2:6]
+
     following = State(
         of_flux_merge=merge_state, of_delta_lambda=delta_state, of_flux_compensation=compensation_state,
         of_flux_monitor=monitor_state, of_v_dead_adaline=v_dead_state, of_psi_adaline=psi_state,
         of_clean_voltage=clean_state, lambda_m_alpha=lambda_m_alpha, lambda_m_beta=lambda_m_beta,
         merge_known=merge_known, lambda_pi_d=lambda_pi_d, lambda_pi_q=lambda_pi_q, lambda_add_d=lambda_add_d,
         lambda_add_q=lambda_add_q, v_comp=v_comp, v_leg=v_leg, s_alpha=s_alpha, s_beta=s_beta,
+        of_motor_residual=residual_state,
     )  # fmt: skip
     return following, Estimated(
         u_comp_d=g.u_comp_d, u_comp_q=g.u_comp_q, u_applied_alpha=u_applied_alpha, u_applied_beta=u_applied_beta,
@@ -225,5 +258,7 @@ def step(state, given, seen, sample, regs, carrier_half):
         merge_known=merge_known, delta_lambda_d=delta_lambda_d, delta_lambda_q=delta_lambda_q, delta_held=delta_held,
         lambda_pi_d=lambda_pi_d, lambda_pi_q=lambda_pi_q, torque=torque_me, flux_faults=flux_faults, d_d=g.d_d,
         d_q=g.d_q, v_dead=v_dead, v_comp=v_comp, v_comp_limited=v_comp_limited, psi_m=psi_m, psi_held=psi_held,
-        temp_lost=g.temp_lost,
+        temp_lost=g.temp_lost, residual_d=residual[0], residual_q=residual[1], residual_mean_d=mean_d,
+        residual_mean_q=mean_q, residual_sixth_d=sixth_d, residual_sixth_q=sixth_q, residual_power=residual[6],
+        residual_sum=residual[7], motor_differs=residual[8],
     )  # fmt: skip

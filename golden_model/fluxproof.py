@@ -36,6 +36,7 @@ from golden_model.estimators import (
     flux_merge,
     flux_models,
     flux_monitor,
+    motor_residual,
     psi_adaline,
     speed_reciprocal,
     torque,
@@ -112,6 +113,7 @@ WIRING = {
     "magnet_flux": (psi_adaline, ("circle", "direction_functions")),
     "directions": (current_directions, ("compensation_dq", "stator_frame", "speed_measurement")),
     "monitor": (flux_monitor, ("inverter_loss", "compensation", "merge", "bus_reciprocal")),
+    "residual": (motor_residual, ("models",)),
     "checks": (sample_checks, ("conditioning", "bus_voltage")),
     "zero_check": (offset_check, ("conditioning", "speed_measurement")),
     "motion": (motion_checks, ("regeneration",)),
@@ -189,6 +191,7 @@ class Config(NamedTuple):
     estimators: int = 1  # 0: field-oriented control alone
     references: int = 0  # 1: current references by a table of torque and flux limit
     position_loop: int = 0  # 1: a position loop over the speed loop, and its trajectory
+    residual: int = 0  # 1: the residual of the motor beside its description, with the estimators
 
 
 class Sample(NamedTuple):
@@ -255,7 +258,7 @@ class State(NamedTuple):
     v_leg: int = 0
     s_alpha: int = 0
     s_beta: int = 0
-    # The torque table's part; last, so that a state written by an older core is the beginning of one.
+    # Parts that a core may have; last, so that a state written by an older core is the beginning of one.
     i_d_table: int = 0
     i_q_table: int = 0
     torque_max: int = 0
@@ -270,6 +273,7 @@ class State(NamedTuple):
     omega_ff: int = 0
     torque_ff: int = 0
     at_rest: int = 0
+    of_motor_residual: motor_residual.State = motor_residual.State()
 
 
 class Observed(NamedTuple):
@@ -330,6 +334,15 @@ class Observed(NamedTuple):
     psi_m: int
     psi_held: int
     temp_lost: int
+    residual_d: int
+    residual_q: int
+    residual_mean_d: int
+    residual_mean_q: int
+    residual_sixth_d: int
+    residual_sixth_q: int
+    residual_power: int
+    residual_sum: int
+    motor_differs: int
     sample_faults: int
     sample_trip: int
     current_offset: int
@@ -470,13 +483,14 @@ def step_table(state, sample, regs, config, of_speed, table):
     after, e = estimation.kept(state), NOTHING_ESTIMATED
     if c.estimators:
         seen = estimation.Seen(
-            i_alpha=i_alpha, i_beta=i_beta, i_d=i_d, i_q=i_q, current_at_rail=current_at_rail, u_dc=u_dc,
+            i_a=i_a, i_b=i_b, i_c=i_c, i_alpha=i_alpha, i_beta=i_beta, i_d=i_d, i_q=i_q,
+            current_at_rail=current_at_rail, u_dc=u_dc,
             u_dc_at_rail=u_dc_at_rail, u_dc_low=u_dc_low, omega_me=omega_me, omega_chord=omega_chord,
             cos_theta=cos_theta, sin_theta=sin_theta, model_d=model_d, model_q=model_q, lambda_d=lambda_d,
             lambda_q=lambda_q, estimate_limited=estimate_limited, u_pi_d=u_pi_d, u_int_d=u_int_d, u_int_q=u_int_q,
             u_q=u_q, sat_d=sat_d, sat_q=sat_q,
         )  # fmt: skip
-        after, e = estimation.step(state, given, seen, x, r, c.carrier_half)
+        after, e = estimation.step(state, given, seen, x, r, c)
 
     references_state, (i_d_table, i_q_table, torque_max) = state.of_torque_reference, (0, 0, 0)
     if c.references:
@@ -545,6 +559,7 @@ def step_table(state, sample, regs, config, of_speed, table):
         regen_limited=regen_limited, of_regeneration_limit=regeneration_state,
         of_position_control=position_state, of_position_trajectory=trajectory_state, position_ref=position_ref,
         omega_ff=omega_ff, torque_ff=torque_ff, at_rest=at_rest,
+        of_motor_residual=after.of_motor_residual,
     )  # fmt: skip
     return following, Observed(
         i_a=i_a, i_b=i_b, i_c=i_c, current_at_rail=current_at_rail, u_dc=u_dc, u_max=u_max, u_dc_at_rail=u_dc_at_rail,
@@ -559,6 +574,9 @@ def step_table(state, sample, regs, config, of_speed, table):
         delta_held=e.delta_held, lambda_pi_d=e.lambda_pi_d, lambda_pi_q=e.lambda_pi_q, torque=e.torque,
         flux_faults=e.flux_faults, d_d=e.d_d, d_q=e.d_q, v_dead=e.v_dead, v_comp=e.v_comp,
         v_comp_limited=e.v_comp_limited, psi_m=e.psi_m, psi_held=e.psi_held, temp_lost=e.temp_lost,
+        residual_d=e.residual_d, residual_q=e.residual_q, residual_mean_d=e.residual_mean_d,
+        residual_mean_q=e.residual_mean_q, residual_sixth_d=e.residual_sixth_d, residual_sixth_q=e.residual_sixth_q,
+        residual_power=e.residual_power, residual_sum=e.residual_sum, motor_differs=e.motor_differs,
         sample_faults=sample_faults, sample_trip=sample_trip, current_offset=current_offset,
         motion_faults=motion_faults, open_load=open_load, encoder_lost=encoder_lost, brake_asked=brake_asked,
         speed_was_given=speed_was_given,

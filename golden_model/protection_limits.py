@@ -13,7 +13,8 @@ per sample on.
 
 import math
 
-from golden_model.formats import LIMIT
+from golden_model.estimators import motor_residual
+from golden_model.formats import LIMIT, PU
 from golden_model.io.emf_check import EMF_I, EMF_L, EMF_MIN, EMF_W, MEAN
 from golden_model.io.emf_check import SAMPLES as EMF_SAMPLES
 from golden_model.io.fault_latch import NAMES
@@ -33,6 +34,11 @@ JUMP_CODES, JUMP_TURN = 4, 5e-4  # of the position, per sample: quantisation of 
 EMF_OF_RATED, EMF_OF_LEG, EMF_OF_R, EMF_OF_PSI, EMF_OF_LI, EMF_OF_PSI_HALL = 0.02, 1.6, 0.5, 0.3, 0.3, 0.8
 # So long at least; over the current loop's bandwidth; with Hall sensors; sectors in that time, whose EMF is not seen
 EMF_S, EMF_OF_LOOP, EMF_HALL_S, EMF_SECTORS = 2.8e-3, 1.4, 0.05, 1.0
+# The mean residual of a described motor: of the EMF at rated speed; of the voltage of dead time and devices; of R*i; of
+# the flux; of L*i at the limit; the sum of the currents: of the rated one, of each current; a light load: of
+# the rated current; the angle that a mean covers
+RESIDUAL_OF_RATED, RESIDUAL_OF_LEG, RESIDUAL_OF_R, RESIDUAL_OF_PSI, RESIDUAL_OF_LI = 0.002, 0.07, 0.06, 0.021, 0.015
+SUM_OF_RESIDUAL, SUM_OF_CURRENT, LIGHT, SECTOR = 0.004, 0.001, 0.1, math.pi / 3.0
 ALWAYS_REPORTED = ("trip", "early")  # the pin always trips, a rejected sample never does
 
 
@@ -65,6 +71,7 @@ def protection(drive):
     yield Entry("watchdog", p.watchdog_periods * drive.sample_time_s, "s", 1.0 / drive.core.clock_hz, keys)
     yield from motion_limits(drive)
     yield from emf_limits(drive)
+    yield from residual_limits(drive)
     yield from brake_limits(drive)
     yield from regeneration_line(drive)
 
@@ -92,6 +99,36 @@ def emf_limits(drive):
         lasts = EMF_HALL_S if hall else max(EMF_S, EMF_OF_LOOP / (drive.control.current_bandwidth_hz or math.inf))
         lasts = min(lasts, EMF_SAMPLES.hi * t_s)
     yield Entry("emf_samples", lasts, "s", t_s, f"[protection] encoder_lost_s; {sample}")
+
+
+def residual_limits(drive):
+    """By how much the motor may differ from its description, and for how long; fluxes are voltages times T_s."""
+    p, b, m, i, t_s = drive.protection, drive.bases, drive.machine, drive.inverter, drive.sample_time_s
+    volts, key, sample = p.residual_v, "[protection] residual_v", "[inverter] pwm_frequency_hz"
+    if volts is None:
+        volts = RESIDUAL_OF_RATED * m.magnet_flux_wb * m.pole_pairs * m.rated_speed_rad_s
+        volts += RESIDUAL_OF_LEG * leg_loss_v(drive)
+        key = "[machine] magnet_flux_wb, rated_speed_rad_s; [inverter] dead_time_s"
+    f = motor_residual
+    leg, drops = leg_loss_v(drive), "[inverter] dead_time_s, pwm_frequency_hz, dc_bus_v, v_switch_v, v_diode_v"
+    yield Entry("residual_leg", min(leg, f.V_LEVEL.hi * f.V_LEVEL.lsb * b.voltage_v), "V", b.voltage_v, drops)
+    yield _fitting("residual_min", volts * t_s, "Wb", b.flux_wb, f.LEAST, f"{key}; {sample}")
+    flux = RESIDUAL_OF_PSI * m.magnet_flux_wb
+    flux += RESIDUAL_OF_LI * max(m.inductance_d_h, m.inductance_q_h) * drive.current_limit_a
+    keys = f"[machine] magnet_flux_wb, inductance_d_h, inductance_q_h; {sample}"
+    yield _fitting("residual_w", flux * t_s, "Wb s/rad", b.flux_wb / b.omega_me_rad_s, f.OF_OMEGA, keys)
+    ohm = RESIDUAL_OF_R * (m.resistance_ohm + max(i.r_switch_ohm, i.r_diode_ohm))
+    keys = f"[machine] resistance_ohm; [inverter] r_switch_ohm, r_diode_ohm; {sample}"
+    yield _fitting("residual_i", ohm * t_s, "H", b.flux_wb / b.current_a, f.OF_I, keys)
+    keys = "[machine] rated_current_a"
+    yield Entry("residual_light", LIGHT * m.rated_current_a, "A", b.current_a, keys)
+    slow, speed = SECTOR / (2**f.MEAN * t_s), base_keys(drive, "omega_me_rad_s")
+    most = PU.hi * PU.lsb * b.omega_me_rad_s
+    yield Entry("residual_slow", min(slow, most), "rad/s", b.omega_me_rad_s, f"{sample}; {speed}")
+    yield _fitting("residual_sum_max", SUM_OF_RESIDUAL * m.rated_current_a, "A", b.current_a, f.SUM_LEAST, keys)
+    yield Entry("residual_sum_i", SUM_OF_CURRENT, "1", 1.0, "none: a share of the current")
+    lasts = min(p.residual_s, f.SAMPLES.hi * t_s)
+    yield Entry("residual_samples", lasts, "s", t_s, f"[protection] residual_s; {sample}")
 
 
 def _fitting(name, value, unit, base, fmt, keys):

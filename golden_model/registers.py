@@ -52,7 +52,13 @@ def registers(drive: Drive, flux=None) -> RegisterSet:
     rows = {name: _row(entries[name], port) for name, port in REGISTERS.items()}
     _keep_pulse_above_dead_time(rows, drive)
     core = drive.core
-    generics = (drive.carrier_half, int(core.estimators), int(core.references), int(core.position_loop))
+    generics = (
+        drive.carrier_half,
+        int(core.estimators),
+        int(core.references),
+        int(core.position_loop),
+        int(core.residual),
+    )
     config = Config(drive.sensors.adc_bits, drive.sensors.position_bits, *generics)
     values = Registers(*(rows[name].integer for name in REGISTERS))
     words = BLANK if table is None else table.words(drive.bases, drive.torque_base_nm)

@@ -13,12 +13,13 @@ TURN_RAD = 2.0 * math.pi
 SIGNALS = {p.name: p for p in sample_latch.BLOCK.outputs} | OBSERVED  # raw sample and references first
 
 _OF_UNIT = {
-    "A": "i_a i_b i_c i_d i_q i_q_ref i_d_ref i_q_ext",
+    "A": "i_a i_b i_c i_d i_q i_q_ref i_d_ref i_q_ext residual_sum",
     "V": "u_dc u_max u_dec_d u_dec_q u_int_d u_int_q u_d u_q u_alpha u_beta u_applied_alpha u_applied_beta "
     "u_comp_d u_comp_q v_dead v_comp",
     "rad/s": "omega_me omega_chord omega_ref",
     "Wb": "lambda_d lambda_q lambda_c_d lambda_c_q lambda_m_alpha lambda_m_beta delta_lambda_d delta_lambda_q "
-    "lambda_pi_d lambda_pi_q psi_m",
+    "lambda_pi_d lambda_pi_q psi_m residual_d residual_q residual_mean_d residual_mean_q residual_sixth_d "
+    "residual_sixth_q",
     "Nm": "torque",
     "degC": "temp_winding",
     "rad": "theta_me",
@@ -47,6 +48,7 @@ ONE_IS = {
     "1/Wb": "omega_base/U_base",
     "Nm s/rad": "1.5*pole_pairs*I_base*U_base/omega_base/omega_base",
     "Nm/rad": "1.5*pole_pairs*I_base*U_base/omega_base/omega_base/T_s",
+    "Wb s/rad": "U_base/omega_base/omega_base",
     "A s/rad": "I_base/omega_base",
     "A/rad": "I_base/omega_base/T_s",
     "1/A": "1/I_base",
@@ -66,7 +68,9 @@ _ONE_OF_REGISTER = {
     "position_kp": "omega_base/(2*pi*pole_pairs)",
     "move_speed": "2*pi/T_s",
     **dict.fromkeys(("dead_time", "min_pulse", "watchdog"), "1/clock_hz"),
-    **dict.fromkeys(("runaway_samples", "stall_samples", "emf_samples", "heartbeat", "charge_samples"), "T_s"),
+    **dict.fromkeys(
+        ("runaway_samples", "stall_samples", "emf_samples", "residual_samples", "heartbeat", "charge_samples"), "T_s"
+    ),
 }
 
 

@@ -12,6 +12,7 @@
 -- table gives both current references at the flux limit of speed and bus voltage, see control/torque_reference.vhd.
 -- POSITION_LOOP = 1 builds a position loop over the speed loop and the trajectory that it follows, used with
 -- position_mode, see control/position_trajectory.vhd.
+-- RESIDUAL = 1 compares the motor with its description, see estimators/motor_residual.vhd.
 -- Formats: per unit, see golden_model/formats.py; settings as `fluxproof registers drive.toml` prints them.
 -- Latency: sample_valid to duty_valid FLUXPROOF_SAMPLE_TO_DUTY clocks; samples FLUXPROOF_SAMPLE_INTERVAL or more apart.
 -- Settings change only between samples, at the latest at the edge at which a sample enters (a setting then applies to
@@ -32,7 +33,8 @@ entity fluxproof is
     CARRIER_HALF  : positive range 8 to 32767 := 10000;  -- half a PWM period in clocks
     ESTIMATORS    : natural range 0 to 1      := 1;  -- 0: field-oriented control alone
     REFERENCES    : natural range 0 to 1      := 0;  -- 1: current references by a table of torque and flux limit
-    POSITION_LOOP : natural range 0 to 1      := 0  -- 1: a position loop over the speed loop, and its trajectory
+    POSITION_LOOP : natural range 0 to 1      := 0;  -- 1: a position loop over the speed loop, and its trajectory
+    RESIDUAL      : natural range 0 to 1      := 0  -- 1: the residual of the motor, with the estimators
   );
   port (
     clk             : in  std_logic;
@@ -483,6 +485,35 @@ begin
                 voltage_known => voltage_known, run => run,
                 l_d => settings.l_d, eta_psi => settings.eta_psi, omega_psi_min => settings.omega_psi_min,
                 out_valid => open, psi_m => e.psi_m, psi_held => e.psi_held);
+
+    residual_of_motor : if RESIDUAL = 1 generate
+      residual : entity work.motor_residual
+        port map (clk => clk, rst => rst, in_valid => models_valid,
+                  model_d => model_d, model_q => model_q, cos_theta => cos_theta, sin_theta => sin_theta, i_a => o.i_a,
+                  i_b => o.i_b, i_c => o.i_c, i_alpha => i_alpha, i_beta => i_beta, i_d => o.i_d, i_q => o.i_q,
+                  omega_me => o.omega_me, u_applied_alpha => e.u_applied_alpha,
+                  u_applied_beta => e.u_applied_beta, s_alpha => s_alpha, s_beta => s_beta, rho => rho,
+                  sat_d => o.sat_d, sat_q => o.sat_q, voltage_known => voltage_known, current_at_rail => o.current_at_rail, run => run,
+                  t_s => settings.t_s, residual_leg => settings.residual_leg, residual_min => settings.residual_min, residual_w => settings.residual_w,
+                  residual_i => settings.residual_i, residual_light => settings.residual_light,
+                  residual_slow => settings.residual_slow, residual_sum_max => settings.residual_sum_max,
+                  residual_sum_i => settings.residual_sum_i, residual_samples => settings.residual_samples,
+                  out_valid => open, residual_d => e.residual_d, residual_q => e.residual_q,
+                  residual_mean_d => e.residual_mean_d, residual_mean_q => e.residual_mean_q,
+                  residual_sixth_d => e.residual_sixth_d, residual_sixth_q => e.residual_sixth_q,
+                  residual_power => e.residual_power, residual_sum => e.residual_sum,
+                  motor_differs => e.motor_differs);
+    else generate
+      e.residual_d <= NOTHING_ESTIMATED.residual_d;
+      e.residual_q <= NOTHING_ESTIMATED.residual_q;
+      e.residual_mean_d <= NOTHING_ESTIMATED.residual_mean_d;
+      e.residual_mean_q <= NOTHING_ESTIMATED.residual_mean_q;
+      e.residual_sixth_d <= NOTHING_ESTIMATED.residual_sixth_d;
+      e.residual_sixth_q <= NOTHING_ESTIMATED.residual_sixth_q;
+      e.residual_power <= NOTHING_ESTIMATED.residual_power;
+      e.residual_sum <= NOTHING_ESTIMATED.residual_sum;
+      e.motor_differs <= NOTHING_ESTIMATED.motor_differs;
+    end generate residual_of_motor;
 
   else generate
     flux_mode    <= to_unsigned(FLUX_MODELS_CURRENT_MODEL, 2);

@@ -11,6 +11,7 @@ proc init_gui {IPINST} {
   ipgui::add_param $IPINST -name "ESTIMATORS" -parent ${page}
   ipgui::add_param $IPINST -name "REFERENCES" -parent ${page}
   ipgui::add_param $IPINST -name "POSITION_LOOP" -parent ${page}
+  ipgui::add_param $IPINST -name "RESIDUAL" -parent ${page}
   ipgui::add_param $IPINST -name "RING_ROWS" -parent ${page}
   ipgui::add_param $IPINST -name "GATE_ACTIVE" -parent ${page}
   ipgui::add_param $IPINST -name "TRIP_ACTIVE" -parent ${page}
@@ -92,6 +93,17 @@ proc validate_PARAM_VALUE.POSITION_LOOP {PARAM_VALUE.POSITION_LOOP} {
 
 proc update_MODELPARAM_VALUE.POSITION_LOOP {MODELPARAM_VALUE.POSITION_LOOP PARAM_VALUE.POSITION_LOOP} {
   set_property value [get_property value ${PARAM_VALUE.POSITION_LOOP}] ${MODELPARAM_VALUE.POSITION_LOOP}
+}
+
+proc update_PARAM_VALUE.RESIDUAL {PARAM_VALUE.RESIDUAL} {
+}
+
+proc validate_PARAM_VALUE.RESIDUAL {PARAM_VALUE.RESIDUAL} {
+  return true
+}
+
+proc update_MODELPARAM_VALUE.RESIDUAL {MODELPARAM_VALUE.RESIDUAL PARAM_VALUE.RESIDUAL} {
+  set_property value [get_property value ${PARAM_VALUE.RESIDUAL}] ${MODELPARAM_VALUE.RESIDUAL}
 }
 
 proc update_PARAM_VALUE.RING_ROWS {PARAM_VALUE.RING_ROWS} {

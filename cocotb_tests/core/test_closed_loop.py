@@ -148,7 +148,13 @@ def test_timeline():
     """Every block starts when its last input is valid and has its declared latency, measured in the RTL."""
     measured = timeline.measure()
     planned = fluxproof.schedule()
-    for label in ("references", "table_current", "position_regulator", "trajectory"):  # only with their generics
+    for label in (
+        "references",
+        "table_current",
+        "position_regulator",
+        "trajectory",
+        "residual",
+    ):  # only with their generics
         del planned[label]
     assert {row["instance"]: (row["first"], row["last"]) for row in measured["blocks"]} == planned
     assert measured["sample_to_duty_clocks"] == fluxproof.SAMPLE_TO_DUTY <= 40

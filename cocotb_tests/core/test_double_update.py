@@ -24,7 +24,7 @@ from golden_model.units import to_si
 from studies.board import double_update
 
 CHANGES = (
-    ("[core]\n", "[core]\nupdates_per_period = 2\n"),
+    ("[core]\n", "[core]\nupdates_per_period = 2\nresidual = true\n"),
     ("sample_time_s = 100e-6", "sample_time_s = 50e-6"),
     ("current_bandwidth_hz = 500", "current_bandwidth_hz = 1250"),
 )
@@ -32,7 +32,7 @@ CHANGES = (
 
 @pytest.fixture(scope="module")
 def twice(tmp_path_factory):
-    """The file of paper 001's drive, updated twice a period."""
+    """The file of paper 001's drive, updated twice a period, with the residual of the motor."""
     text = PAPER.read_text()
     for before, after in CHANGES:
         assert text.count(before) == 1
@@ -50,6 +50,7 @@ def test_closed_loop_in_verilator(twice):
     assert summary["differences"] == 0 and summary["periods_compared"] == 5000
     assert np.count_nonzero(arrays["observed_sat_q"]) > 100
     assert np.count_nonzero(arrays["observed_speed_limited"]) > 100
+    assert np.count_nonzero(arrays["observed_residual_d"]) > 4000 and not arrays["observed_motor_differs"].any()
     for leg in range(3):
         check_edges(arrays, register_set, leg)
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.needs import skip_without_ghdl5
-from fluxproof.hil.registers import machine_of, motor_registers, motor_scale
+from fluxproof.hil.registers import PORTS, code, machine_of, motor_registers, motor_scale
 from fluxproof.plant.pmsm import Machine
 from golden_model.motor.motor_model import Shown
-from studies.hil import closed_loop, equal
+from studies.hil import closed_loop, equal, golden
 from studies.hil.beside_plant import HELD, OWN, beside_plant
 from studies.hil.drive import CLOCK_HZ, CURRENT_A, SERVO, SWITCHES, U_DC_V, ride, servo
 from studies.hil.plant import ANGLE_DEG, CURRENT_PERCENT, TORQUE_PERCENT, differences
@@ -35,6 +35,23 @@ def test_core_and_motor_in_one():
     assert not len(wrong), f"gates differ at clock {wrong[0]}"
     assert rtl.observed[-1] == golden.observed[-1]
     assert golden.observed[-1]["omega_me"] > 1000, "the shaft does not turn"
+
+
+@pytest.mark.slow
+def test_compiled_loop_is_the_clocked_one():
+    """Core and motor in one compiled loop: every value of every sample as clock by clock, with a held shaft."""
+    of, periods = closed_loop.parts(), 40
+    turns = 100.0 * of.scale.step_s / (2 * np.pi)
+    speed = code("omega_set", turns, PORTS["omega_set"].fmt)
+    of = of._replace(motor=of.motor._replace(hold=1, omega_set=speed))
+    clocked = closed_loop.golden_run(of, periods, 1 << 40).observed
+    asked = np.array([[*closed_loop.references(of).values(), 0]] * periods, np.int64)
+    u_dc = of.scale.u_dc(of.drive.inverter.dc_bus_v)
+    hil = golden.Hil(of.core.values, of.core.config, of.motor, of.tables, of.sensors, u_dc)
+    _, observed = golden.record(hil, asked, np.full(periods, speed, np.int64))
+    for k, row in enumerate(clocked):
+        assert row == {name: int(values[k]) for name, values in observed.items()}, f"sample {k}"
+    assert len(clocked) == periods - 1 and abs(clocked[-1]["omega_me"]) > 1000
 
 
 @pytest.mark.parametrize("how", [HELD, OWN])

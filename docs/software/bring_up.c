@@ -151,6 +151,9 @@ static void check_generics(void)
         {"REFERENCES", AT(references), 1},
 #endif
         {"POSITION_LOOP", AT(position_loop), FLUXPROOF_POSITION_LOOP},
+#if FLUXPROOF_RESIDUAL
+        {"RESIDUAL", AT(residual), 1},
+#endif
 #ifdef FLUXPROOF_ENCODER /* the drive file has front ends: the core must be a fluxproof_board with them */
         {"ENCODER", AT(encoder), FLUXPROOF_ENCODER},
         {"CURRENTS", AT(currents), FLUXPROOF_CURRENTS},

@@ -58,6 +58,11 @@ extern "C" {
 #define FLUXPROOF__POSITION_LOOP__VALUE_bp 0
 #define FLUXPROOF__POSITION_LOOP__VALUE_bw 32
 
+// reg - fluxproof::residual
+#define FLUXPROOF__RESIDUAL__VALUE_bm 0xffffffff
+#define FLUXPROOF__RESIDUAL__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL__VALUE_bw 32
+
 // reg - fluxproof::enable
 #define FLUXPROOF__ENABLE__VALUE_bm 0x1
 #define FLUXPROOF__ENABLE__VALUE_bp 0
@@ -119,15 +124,15 @@ extern "C" {
 #define FLUXPROOF__TEMP_VALID__VALUE_reset 0x0
 
 // reg - fluxproof::irq_mask
-#define FLUXPROOF__IRQ_MASK__VALUE_bm 0xf
+#define FLUXPROOF__IRQ_MASK__VALUE_bm 0x1f
 #define FLUXPROOF__IRQ_MASK__VALUE_bp 0
-#define FLUXPROOF__IRQ_MASK__VALUE_bw 4
+#define FLUXPROOF__IRQ_MASK__VALUE_bw 5
 #define FLUXPROOF__IRQ_MASK__VALUE_reset 0x0
 
 // reg - fluxproof::irq_clear
-#define FLUXPROOF__IRQ_CLEAR__VALUE_bm 0xf
+#define FLUXPROOF__IRQ_CLEAR__VALUE_bm 0x1f
 #define FLUXPROOF__IRQ_CLEAR__VALUE_bp 0
-#define FLUXPROOF__IRQ_CLEAR__VALUE_bw 4
+#define FLUXPROOF__IRQ_CLEAR__VALUE_bw 5
 #define FLUXPROOF__IRQ_CLEAR__VALUE_reset 0x0
 
 // reg - fluxproof::omega_given
@@ -194,6 +199,9 @@ extern "C" {
 #define FLUXPROOF__FLAGS__REGEN_LIMITED_bm 0x10000
 #define FLUXPROOF__FLAGS__REGEN_LIMITED_bp 16
 #define FLUXPROOF__FLAGS__REGEN_LIMITED_bw 1
+#define FLUXPROOF__FLAGS__MOTOR_DIFFERS_bm 0x1000000
+#define FLUXPROOF__FLAGS__MOTOR_DIFFERS_bp 24
+#define FLUXPROOF__FLAGS__MOTOR_DIFFERS_bw 1
 
 // reg - fluxproof::flux_faults
 #define FLUXPROOF__FLUX_FAULTS__VALUE_bm 0x7f
@@ -296,9 +304,9 @@ extern "C" {
 #define FLUXPROOF__EARLY_SAMPLES__VALUE_bw 8
 
 // reg - fluxproof::irq_cause
-#define FLUXPROOF__IRQ_CAUSE__VALUE_bm 0xf
+#define FLUXPROOF__IRQ_CAUSE__VALUE_bm 0x1f
 #define FLUXPROOF__IRQ_CAUSE__VALUE_bp 0
-#define FLUXPROOF__IRQ_CAUSE__VALUE_bw 4
+#define FLUXPROOF__IRQ_CAUSE__VALUE_bw 5
 
 // reg - fluxproof::code_a
 #define FLUXPROOF__CODE_A__VALUE_bm 0xffff
@@ -977,6 +985,100 @@ extern "C" {
 #define FLUXPROOF__POSITION_ERROR__VALUE_bp 0
 #define FLUXPROOF__POSITION_ERROR__VALUE_bw 32
 
+// reg - fluxproof::residual_min
+#define FLUXPROOF__RESIDUAL_MIN__VALUE_bm 0x1ffff
+#define FLUXPROOF__RESIDUAL_MIN__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_MIN__VALUE_bw 17
+#define FLUXPROOF__RESIDUAL_MIN__VALUE_reset 0x0
+
+// reg - fluxproof::residual_w
+#define FLUXPROOF__RESIDUAL_W__VALUE_bm 0xffffff
+#define FLUXPROOF__RESIDUAL_W__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_W__VALUE_bw 24
+#define FLUXPROOF__RESIDUAL_W__VALUE_reset 0x0
+
+// reg - fluxproof::residual_i
+#define FLUXPROOF__RESIDUAL_I__VALUE_bm 0xffffff
+#define FLUXPROOF__RESIDUAL_I__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_I__VALUE_bw 24
+#define FLUXPROOF__RESIDUAL_I__VALUE_reset 0x0
+
+// reg - fluxproof::residual_samples
+#define FLUXPROOF__RESIDUAL_SAMPLES__VALUE_bm 0xfff
+#define FLUXPROOF__RESIDUAL_SAMPLES__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_SAMPLES__VALUE_bw 12
+#define FLUXPROOF__RESIDUAL_SAMPLES__VALUE_reset 0x0
+
+// reg - fluxproof::residual_sum_max
+#define FLUXPROOF__RESIDUAL_SUM_MAX__VALUE_bm 0x3ffff
+#define FLUXPROOF__RESIDUAL_SUM_MAX__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_SUM_MAX__VALUE_bw 18
+#define FLUXPROOF__RESIDUAL_SUM_MAX__VALUE_reset 0x0
+
+// reg - fluxproof::residual_sum_i
+#define FLUXPROOF__RESIDUAL_SUM_I__VALUE_bm 0x3fffff
+#define FLUXPROOF__RESIDUAL_SUM_I__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_SUM_I__VALUE_bw 22
+#define FLUXPROOF__RESIDUAL_SUM_I__VALUE_reset 0x0
+
+// reg - fluxproof::residual_d
+#define FLUXPROOF__RESIDUAL_D__VALUE_bm 0xffffffff
+#define FLUXPROOF__RESIDUAL_D__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_D__VALUE_bw 32
+
+// reg - fluxproof::residual_q
+#define FLUXPROOF__RESIDUAL_Q__VALUE_bm 0xffffffff
+#define FLUXPROOF__RESIDUAL_Q__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_Q__VALUE_bw 32
+
+// reg - fluxproof::residual_mean_d
+#define FLUXPROOF__RESIDUAL_MEAN_D__VALUE_bm 0xffffffff
+#define FLUXPROOF__RESIDUAL_MEAN_D__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_MEAN_D__VALUE_bw 32
+
+// reg - fluxproof::residual_mean_q
+#define FLUXPROOF__RESIDUAL_MEAN_Q__VALUE_bm 0xffffffff
+#define FLUXPROOF__RESIDUAL_MEAN_Q__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_MEAN_Q__VALUE_bw 32
+
+// reg - fluxproof::residual_sixth_d
+#define FLUXPROOF__RESIDUAL_SIXTH_D__VALUE_bm 0xffffffff
+#define FLUXPROOF__RESIDUAL_SIXTH_D__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_SIXTH_D__VALUE_bw 32
+
+// reg - fluxproof::residual_sixth_q
+#define FLUXPROOF__RESIDUAL_SIXTH_Q__VALUE_bm 0xffffffff
+#define FLUXPROOF__RESIDUAL_SIXTH_Q__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_SIXTH_Q__VALUE_bw 32
+
+// reg - fluxproof::residual_power
+#define FLUXPROOF__RESIDUAL_POWER__VALUE_bm 0xffffffff
+#define FLUXPROOF__RESIDUAL_POWER__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_POWER__VALUE_bw 32
+
+// reg - fluxproof::residual_sum
+#define FLUXPROOF__RESIDUAL_SUM__VALUE_bm 0x1fffff
+#define FLUXPROOF__RESIDUAL_SUM__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_SUM__VALUE_bw 21
+
+// reg - fluxproof::residual_leg
+#define FLUXPROOF__RESIDUAL_LEG__VALUE_bm 0x1ffff
+#define FLUXPROOF__RESIDUAL_LEG__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_LEG__VALUE_bw 17
+#define FLUXPROOF__RESIDUAL_LEG__VALUE_reset 0x0
+
+// reg - fluxproof::residual_light
+#define FLUXPROOF__RESIDUAL_LIGHT__VALUE_bm 0xffffffff
+#define FLUXPROOF__RESIDUAL_LIGHT__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_LIGHT__VALUE_bw 32
+#define FLUXPROOF__RESIDUAL_LIGHT__VALUE_reset 0x0
+
+// reg - fluxproof::residual_slow
+#define FLUXPROOF__RESIDUAL_SLOW__VALUE_bm 0xffffffff
+#define FLUXPROOF__RESIDUAL_SLOW__VALUE_bp 0
+#define FLUXPROOF__RESIDUAL_SLOW__VALUE_bw 32
+#define FLUXPROOF__RESIDUAL_SLOW__VALUE_reset 0x0
+
 // reg - fluxproof::ring_arm
 #define FLUXPROOF__RING_ARM__VALUE_bm 0x1
 #define FLUXPROOF__RING_ARM__VALUE_bp 0
@@ -1546,7 +1648,8 @@ typedef struct {
     uint32_t estimators;
     uint32_t references;
     uint32_t position_loop;
-    uint8_t RESERVED_24_3f[0x1c];
+    uint32_t residual;
+    uint8_t RESERVED_28_3f[0x18];
     uint32_t enable;
     uint32_t clear_trip;
     uint32_t clear_faults;
@@ -1705,7 +1808,25 @@ typedef struct {
     uint8_t RESERVED_2bc_2df[0x24];
     uint32_t shaft_position;
     uint32_t position_error;
-    uint8_t RESERVED_2e8_3bf[0xd8];
+    uint8_t RESERVED_2e8_33f[0x58];
+    uint32_t residual_min;
+    uint32_t residual_w;
+    uint32_t residual_i;
+    uint32_t residual_samples;
+    uint32_t residual_sum_max;
+    uint32_t residual_sum_i;
+    uint32_t residual_d;
+    uint32_t residual_q;
+    uint32_t residual_mean_d;
+    uint32_t residual_mean_q;
+    uint32_t residual_sixth_d;
+    uint32_t residual_sixth_q;
+    uint32_t residual_power;
+    uint32_t residual_sum;
+    uint32_t residual_leg;
+    uint32_t residual_light;
+    uint32_t residual_slow;
+    uint8_t RESERVED_384_3bf[0x3c];
     uint32_t ring_arm;
     uint32_t ring_stop;
     uint32_t ring_faults;

@@ -173,7 +173,14 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
     )  # fmt: skip
     core, entered, seen_core = clocked.step(state.of_core, now, regs, carrier_half)
     causes, (_, irq) = interrupts_step(
-        state.of_interrupts, w.tripped, w.fault_flags, w.setting_refused, w.running, b.irq_mask, b.irq_clear
+        state.of_interrupts,
+        w.tripped,
+        w.fault_flags,
+        w.setting_refused,
+        w.running,
+        i.motor_differs,
+        b.irq_mask,
+        b.irq_clear,
     )
     x, y, z = seen_position, seen_converters, seen_core
     wires = Wires(
@@ -379,6 +386,7 @@ class BoardClock:
             speed_given=w.speed_now,
             position_restart=1 if values["position_restart"] or w.position_restart else 0,
             emf_samples=0 if w.forced else values["emf_samples"],
+            residual_samples=0 if w.forced else values["residual_samples"],
         )
         self.of_samples, observed = fluxproof.step(self.of_samples, sample, registers, self.blocks.core)
         self.observed = observed

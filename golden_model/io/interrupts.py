@@ -5,9 +5,10 @@
           1  a fault appeared in fault_flags, whether it trips or not
           2  dead_time and min_pulse contradict each other (setting_refused)
           3  the gates were on and are off
+          4  the motor is not the one described (motor_differs)
     irq = a cause that irq_mask does not mask
 
-A cause stays until ``irq_clear`` has a one in its bit; what is still present (0, 2) sets it again at once.
+A cause stays until ``irq_clear`` has a one in its bit; what is still present (0, 2, 4) sets it again at once.
 Formats: bits.
 """
 
@@ -19,7 +20,7 @@ from golden_model.formats import BIT
 from golden_model.io.fault_latch import FLAGS
 from golden_model.kernel import kernel
 
-CAUSES = Format(0, 4, 0)
+CAUSES = Format(0, 5, 0)
 
 
 class State(NamedTuple):
@@ -29,10 +30,10 @@ class State(NamedTuple):
 
 
 @kernel
-def step(state, tripped, fault_flags, setting_refused, running, irq_mask, irq_clear):
+def step(state, tripped, fault_flags, setting_refused, running, motor_differs, irq_mask, irq_clear):
     appeared = 1 if fault_flags & ~state.flags else 0
     stopped = 1 if state.running and not running else 0
-    now = tripped + 2 * appeared + 4 * setting_refused + 8 * stopped
+    now = tripped + 2 * appeared + 4 * setting_refused + 8 * stopped + 16 * motor_differs
     causes = (state.causes & ~irq_clear) | now
     return State(causes, fault_flags, running), (causes, 1 if causes & ~irq_mask else 0)
 
@@ -41,15 +42,16 @@ def stimuli(_rng, _config):
     """Each cause alone, cleared while present and when gone, masked; faults that come while another is present."""
     calm = dict.fromkeys((p.name for p in BLOCK.inputs), 0)
     rows = []
-    causes = ({"tripped": 1}, {"setting_refused": 1}, {"running": 1}, *({"fault_flags": 1 << k} for k in range(15)))
+    levels = ({name: 1} for name in ("tripped", "setting_refused", "running", "motor_differs"))
+    causes = (*levels, *({"fault_flags": 1 << k} for k in range(15)))
     for cause in causes:
-        for clear in (15, 1, 2, 4, 8, 0):
+        for clear in (31, 1, 2, 4, 8, 16, 0):
             for mask in (0, clear):
                 rows += [calm | cause, calm | cause | {"irq_clear": clear}, calm | {"irq_mask": mask}]
                 rows += [calm | cause | {"irq_mask": mask}, calm, calm | {"irq_clear": clear}, calm]
-                rows += [calm | {"irq_clear": 15}]
-    rows += [calm | {"fault_flags": 1}, calm | {"fault_flags": 1, "irq_clear": 15}, calm | {"fault_flags": 3}]
-    return [*rows, calm | {"irq_clear": 15}]
+                rows += [calm | {"irq_clear": 31}]
+    rows += [calm | {"fault_flags": 1}, calm | {"fault_flags": 1, "irq_clear": 31}, calm | {"fault_flags": 3}]
+    return [*rows, calm | {"irq_clear": 31}]
 
 
 BLOCK = Block(
@@ -62,11 +64,12 @@ BLOCK = Block(
         Port("fault_flags", FLAGS, doc="faults since the last clear_trip"),
         Port("setting_refused", BIT, doc="1: dead_time and min_pulse contradict each other"),
         Port("running", BIT, doc="1: gates are switching"),
+        Port("motor_differs", BIT, doc="1: the motor is not the one described"),
         Port("irq_mask", CAUSES, doc="bit x: cause x of irq_cause does not raise irq"),
         Port("irq_clear", CAUSES, doc="bit x: clear cause x of irq_cause"),
     ),
     outputs=(
-        Port("irq_cause", CAUSES, doc="causes since they were cleared: trip, fault, setting refused, gates gone off"),
+        Port("irq_cause", CAUSES, doc="causes since cleared: trip, fault, setting refused, gates off, motor differs"),
         Port("irq", BIT, doc="1: a cause that is not masked"),
     ),
     state=State(),

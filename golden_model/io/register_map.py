@@ -35,7 +35,16 @@ PATIENCE = fluxproof.SAMPLE_INTERVAL + 16  # clocks that a write waits for the e
 IDENTIFICATION = int.from_bytes(b"FLUX", "big")
 
 WORD = Format(0, 32, 0)
-GENERICS = ("adc_bits", "position_bits", "carrier_half", "clock_hz", "estimators", "references", "position_loop")
+GENERICS = (
+    "adc_bits",
+    "position_bits",
+    "carrier_half",
+    "clock_hz",
+    "estimators",
+    "references",
+    "position_loop",
+    "residual",
+)
 
 
 class Kind(Enum):
@@ -115,7 +124,11 @@ _SETTINGS = """
     280 position_mode 284 position_target                 288 position_kp    28c position_band  290 omega_most
     294 move_speed    298 move_step      29c jerk_bits      2a0 torque_lead    2a4 use_stops      2a8 stop_low
     2ac stop_high     2b0 k_inertia      2b4 k_viscous      2b8 coulomb
-"""  # 24c, 278, 27c, 2bc to 2dc, 2e8 to 3bc and 3f0 to 3fc are free
+    340 residual_min  344 residual_w     348 residual_i     34c residual_samples
+    350 residual_sum_max                 354 residual_sum_i
+    378 residual_leg  37c residual_light
+    380 residual_slow
+"""  # 24c, 278 to 27c, 2bc to 2dc, 2e8 to 33c, 384 to 3bc and 3f0 to 3fc are free
 _COMMANDS = {
     "enable": (0x040, Kind.COMMAND),
     "clear_trip": (0x044, Kind.PULSE),
@@ -144,7 +157,11 @@ _STATUS = """
     0b4 lambda_q      0b8 psi_m           0bc v_dead       0c0 v_comp
     0c8 telemetry_dropped                 0cc fault_flags      0d0 first_fault    0d4 early_samples
     0d8 irq_cause     0dc code_a          0e0 code_b           0e4 code_c         0e8 code_u_dc
-    0ec code_theta    2e0 shaft_position  2e4 position_error  3e4 ring_depth      3e8 ring_next    3ec ring_data
+    0ec code_theta    2e0 shaft_position  2e4 position_error
+    358 residual_d     35c residual_q     360 residual_mean_d
+    364 residual_mean_q                  368 residual_sixth_d                 36c residual_sixth_q
+    370 residual_power                   374 residual_sum
+    3e4 ring_depth      3e8 ring_next    3ec ring_data
 """
 # Bits of the word "flags", read together: name -> lowest bit.
 _FLAGS = {
@@ -163,6 +180,7 @@ _FLAGS = {
     "brake_asked": 14,
     "double_used": 15,
     "regen_limited": 16,
+    "motor_differs": 24,
 }
 # Bits of the word "ring_state", likewise
 _RING_STATE = {"ring_recording": 0, "ring_ended": 1, "ring_full": 2, "ring_cause": 4}
@@ -237,6 +255,7 @@ def _read_only() -> list[Register]:
         word("estimators", 0x018, Kind.GENERIC, "1: with estimators, 0: field-oriented control alone"),
         word("references", 0x01C, Kind.GENERIC, "1: with current references by a table of torque and flux limit"),
         word("position_loop", 0x020, Kind.GENERIC, "1: with a position loop and its trajectory"),
+        word("residual", 0x024, Kind.GENERIC, "1: with the residual of the motor beside its description"),
         Register("flags", 0x080, Kind.STATUS, flags, "status flags of the core, read together"),
         Register("ring_state", 0x3E0, Kind.STATUS, ring_state, "what the ring of telemetry does, read together"),
         *(

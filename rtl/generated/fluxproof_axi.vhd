@@ -27,6 +27,7 @@ entity fluxproof_axi is
     ESTIMATORS    : integer range 0 to 1         := 1;  -- 0 leaves the estimators out
     REFERENCES    : integer range 0 to 1         := 0;  -- 1 builds the torque table
     POSITION_LOOP : integer range 0 to 1         := 0;  -- 1 builds the position loop and its trajectory
+    RESIDUAL      : integer range 0 to 1         := 0;  -- 1 compares the motor with its description
     RING_ROWS     : integer range 0 to 2730      := 0;  -- telemetry rows of the ring, 42 in a block RAM; 0 leaves it out
     GATE_ACTIVE   : integer range 0 to 1         := 1;  -- level of gate_high and gate_low at which a switch is on
     TRIP_ACTIVE   : integer range 0 to 1         := 1;  -- level of trip that turns the gates off
@@ -88,8 +89,8 @@ architecture rtl of fluxproof_axi is
   signal speed_mode_in     : std_logic;
   signal temp_winding_in   : signed(15 downto 0);
   signal temp_valid_in     : std_logic;
-  signal irq_mask          : unsigned(3 downto 0);
-  signal irq_clear         : unsigned(3 downto 0);
+  signal irq_mask          : unsigned(4 downto 0);
+  signal irq_clear         : unsigned(4 downto 0);
   signal ring_arm          : std_logic;
   signal ring_stop         : std_logic;
   signal ring_faults       : unsigned(16 downto 0);
@@ -124,9 +125,10 @@ architecture rtl of fluxproof_axi is
   signal ring_next         : unsigned(15 downto 0);
   signal ring_data         : unsigned(31 downto 0);
   signal ring_depth        : unsigned(11 downto 0);
-  signal irq_cause         : unsigned(3 downto 0);
+  signal irq_cause         : unsigned(4 downto 0);
   signal trip_now          : std_logic;
   signal sample            : sample_t;
+  signal motor_differs     : std_logic;
 begin
 
   process (aclk)
@@ -150,6 +152,8 @@ begin
   sample.temp_valid    <= temp_valid_in;
   sample.clear_faults  <= clear_faults_in;
 
+  motor_differs <= estimated.motor_differs;
+
   registers : entity work.register_file
     generic map (
       ADC_BITS      => ADC_BITS,
@@ -158,7 +162,8 @@ begin
       CLOCK_HZ      => CLOCK_HZ,
       ESTIMATORS    => ESTIMATORS,
       REFERENCES    => REFERENCES,
-      POSITION_LOOP => POSITION_LOOP
+      POSITION_LOOP => POSITION_LOOP,
+      RESIDUAL      => RESIDUAL
     )
     port map (
       clk               => aclk,
@@ -231,7 +236,8 @@ begin
       CARRIER_HALF  => CARRIER_HALF,
       ESTIMATORS    => ESTIMATORS,
       REFERENCES    => REFERENCES,
-      POSITION_LOOP => POSITION_LOOP
+      POSITION_LOOP => POSITION_LOOP,
+      RESIDUAL      => RESIDUAL
     )
     port map (
       clk             => aclk,
@@ -324,6 +330,7 @@ begin
       fault_flags     => fault_flags,
       setting_refused => setting_refused,
       running         => running,
+      motor_differs   => motor_differs,
       irq_mask        => irq_mask,
       irq_clear       => irq_clear,
       irq_cause       => irq_cause,

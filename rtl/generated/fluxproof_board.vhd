@@ -28,6 +28,7 @@ entity fluxproof_board is
     ESTIMATORS    : integer range 0 to 1         := 1;  -- 0 leaves the estimators out
     REFERENCES    : integer range 0 to 1         := 0;  -- 1 builds the torque table
     POSITION_LOOP : integer range 0 to 1         := 0;  -- 1 builds the position loop and its trajectory
+    RESIDUAL      : integer range 0 to 1         := 0;  -- 1 compares the motor with its description
     RING_ROWS     : integer range 0 to 2730      := 0;  -- telemetry rows of the ring, 42 in a block RAM; 0 leaves it out
     GATE_ACTIVE   : integer range 0 to 1         := 1;  -- level of gate_high and gate_low at which a switch is on
     TRIP_ACTIVE   : integer range 0 to 1         := 1;  -- level of trip that turns the gates off
@@ -115,8 +116,8 @@ architecture rtl of fluxproof_board is
   signal speed_mode_in     : std_logic;
   signal temp_winding_in   : signed(15 downto 0);
   signal temp_valid_in     : std_logic;
-  signal irq_mask          : unsigned(3 downto 0);
-  signal irq_clear         : unsigned(3 downto 0);
+  signal irq_mask          : unsigned(4 downto 0);
+  signal irq_clear         : unsigned(4 downto 0);
   signal ring_arm          : std_logic;
   signal ring_stop         : std_logic;
   signal ring_faults       : unsigned(16 downto 0);
@@ -212,7 +213,7 @@ architecture rtl of fluxproof_board is
   signal ring_next         : unsigned(15 downto 0);
   signal ring_data         : unsigned(31 downto 0);
   signal ring_depth        : unsigned(11 downto 0);
-  signal irq_cause         : unsigned(3 downto 0);
+  signal irq_cause         : unsigned(4 downto 0);
   signal trip_now          : std_logic;
   signal encoder_code      : unsigned(POSITION_BITS - 1 downto 0);
   signal encoder_restart   : std_logic;
@@ -258,6 +259,7 @@ architecture rtl of fluxproof_board is
   signal sample            : sample_t;
   signal core_settings     : settings_t;
   signal core_trip         : std_logic;
+  signal motor_differs     : std_logic;
 begin
 
   process (aclk)
@@ -290,12 +292,15 @@ begin
     given.speed_given      := speed_now;
     given.position_restart := settings.position_restart or position_restart;
     if forced = '1' then
-      given.emf_samples := (others => '0');
+      given.emf_samples      := (others => '0');
+      given.residual_samples := (others => '0');
     end if;
     core_settings          <= given;
   end process;
 
   core_trip <= trip_now or board_stop;
+
+  motor_differs <= estimated.motor_differs;
 
   registers : entity work.board_register_file
     generic map (
@@ -306,6 +311,7 @@ begin
       ESTIMATORS    => ESTIMATORS,
       REFERENCES    => REFERENCES,
       POSITION_LOOP => POSITION_LOOP,
+      RESIDUAL      => RESIDUAL,
       ENCODER       => ENCODER,
       CURRENTS      => CURRENTS,
       SPI_LINES     => SPI_LINES
@@ -462,7 +468,8 @@ begin
       CARRIER_HALF  => CARRIER_HALF,
       ESTIMATORS    => ESTIMATORS,
       REFERENCES    => REFERENCES,
-      POSITION_LOOP => POSITION_LOOP
+      POSITION_LOOP => POSITION_LOOP,
+      RESIDUAL      => RESIDUAL
     )
     port map (
       clk             => aclk,
@@ -555,6 +562,7 @@ begin
       fault_flags     => fault_flags,
       setting_refused => setting_refused,
       running         => running,
+      motor_differs   => motor_differs,
       irq_mask        => irq_mask,
       irq_clear       => irq_clear,
       irq_cause       => irq_cause,

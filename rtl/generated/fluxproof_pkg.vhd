@@ -153,6 +153,15 @@ package fluxproof_pkg is
     omega_psi_min    : unsigned(DUTY_W - 1 downto 0);  -- psi_m is held below this speed
     k_ahead          : unsigned(DUTY_W - 1 downto 0);  -- angle of 2.5 sample times in radians, per unit of speed
     k_sign           : unsigned(23 downto 0);  -- 1 / (current above which a direction is +-1)
+    residual_leg     : unsigned(SAMPLE_TIME_W - 1 downto 0);  -- described voltage loss of a leg by dead time and device drops
+    residual_min     : unsigned(16 downto 0);  -- voltage that the mean residual may have at rest without current, times t_s
+    residual_w       : unsigned(23 downto 0);  -- the same for each electrical speed
+    residual_i       : unsigned(23 downto 0);  -- the same for each current
+    residual_light   : signed(PU_W - 1 downto 0);  -- current below which the loss of a leg is not certain
+    residual_slow    : signed(PU_W - 1 downto 0);  -- electrical speed below which a mean sees a leg at one current
+    residual_sum_max : unsigned(17 downto 0);  -- mean that the sum of the currents may have without current
+    residual_sum_i   : unsigned(RHO_W - 1 downto 0);  -- the same for each current
+    residual_samples : unsigned(11 downto 0);  -- samples over a limit, more than others, that are another motor; 0: off
     i_trip           : unsigned(LIMIT_W - 1 downto 0);  -- phase current that trips
     sum_trip         : unsigned(LIMIT_W - 1 downto 0);  -- sum of the phase currents that trips
     rail_samples     : unsigned(3 downto 0);  -- consecutive samples at the rail that trip
@@ -234,57 +243,75 @@ package fluxproof_pkg is
   end record observed_t;
 
   type estimated_t is record
-    u_comp_d        : signed(PU_W - 1 downto 0);  -- compensation voltage, d axis
-    u_comp_q        : signed(PU_W - 1 downto 0);  -- compensation voltage, q axis
-    u_applied_alpha : signed(FLUX_W - 1 downto 0);  -- voltage of the coming period, alpha
-    u_applied_beta  : signed(FLUX_W - 1 downto 0);  -- voltage of the coming period, beta
-    lambda_c_d      : signed(FLUX_W - 1 downto 0);  -- flux linkage of the current model, d axis
-    lambda_c_q      : signed(FLUX_W - 1 downto 0);  -- flux linkage of the current model, q axis
-    lambda_m_alpha  : signed(FLUX_W - 1 downto 0);  -- merged flux before the sample's resistive drop, alpha
-    lambda_m_beta   : signed(FLUX_W - 1 downto 0);  -- merged flux before the sample's resistive drop, beta
-    merge_known     : std_logic;  -- 1: the merged flux is valid at the next sample
-    delta_lambda_d  : signed(FLUX_W - 1 downto 0);  -- flux linkage missing in the estimate, d axis
-    delta_lambda_q  : signed(FLUX_W - 1 downto 0);  -- flux linkage missing in the estimate, q axis
-    delta_held      : std_logic;  -- 1: held, the integrals do not show the flux error
-    lambda_pi_d     : signed(FLUX_W - 1 downto 0);  -- compensation, d axis
-    lambda_pi_q     : signed(FLUX_W - 1 downto 0);  -- compensation, q axis
-    torque          : signed(PU_W - 1 downto 0);  -- estimated torque
-    flux_faults     : unsigned(6 downto 0);  -- what has disturbed the flux estimate, see flux_monitor
-    d_d             : signed(PU_W - 1 downto 0);  -- direction function D_d / 3
-    d_q             : signed(PU_W - 1 downto 0);  -- direction function D_q / 3
-    v_dead          : signed(V_LEG_W - 1 downto 0);  -- leg voltage loss that is not compensated
-    v_comp          : signed(V_LEG_W - 1 downto 0);  -- leg voltage that is compensated
-    v_comp_limited  : std_logic;  -- the compensation reached its limit
-    psi_m           : signed(PU_W - 1 downto 0);  -- flux linkage of the magnets
-    psi_held        : std_logic;  -- 1: psi_m is held
-    temp_lost       : std_logic;  -- 1: no valid temperature, r = r_s
+    u_comp_d         : signed(PU_W - 1 downto 0);  -- compensation voltage, d axis
+    u_comp_q         : signed(PU_W - 1 downto 0);  -- compensation voltage, q axis
+    u_applied_alpha  : signed(FLUX_W - 1 downto 0);  -- voltage of the coming period, alpha
+    u_applied_beta   : signed(FLUX_W - 1 downto 0);  -- voltage of the coming period, beta
+    lambda_c_d       : signed(FLUX_W - 1 downto 0);  -- flux linkage of the current model, d axis
+    lambda_c_q       : signed(FLUX_W - 1 downto 0);  -- flux linkage of the current model, q axis
+    lambda_m_alpha   : signed(FLUX_W - 1 downto 0);  -- merged flux before the sample's resistive drop, alpha
+    lambda_m_beta    : signed(FLUX_W - 1 downto 0);  -- merged flux before the sample's resistive drop, beta
+    merge_known      : std_logic;  -- 1: the merged flux is valid at the next sample
+    delta_lambda_d   : signed(FLUX_W - 1 downto 0);  -- flux linkage missing in the estimate, d axis
+    delta_lambda_q   : signed(FLUX_W - 1 downto 0);  -- flux linkage missing in the estimate, q axis
+    delta_held       : std_logic;  -- 1: held, the integrals do not show the flux error
+    lambda_pi_d      : signed(FLUX_W - 1 downto 0);  -- compensation, d axis
+    lambda_pi_q      : signed(FLUX_W - 1 downto 0);  -- compensation, q axis
+    torque           : signed(PU_W - 1 downto 0);  -- estimated torque
+    flux_faults      : unsigned(6 downto 0);  -- what has disturbed the flux estimate, see flux_monitor
+    d_d              : signed(PU_W - 1 downto 0);  -- direction function D_d / 3
+    d_q              : signed(PU_W - 1 downto 0);  -- direction function D_q / 3
+    v_dead           : signed(V_LEG_W - 1 downto 0);  -- leg voltage loss that is not compensated
+    v_comp           : signed(V_LEG_W - 1 downto 0);  -- leg voltage that is compensated
+    v_comp_limited   : std_logic;  -- the compensation reached its limit
+    psi_m            : signed(PU_W - 1 downto 0);  -- flux linkage of the magnets
+    psi_held         : std_logic;  -- 1: psi_m is held
+    temp_lost        : std_logic;  -- 1: no valid temperature, r = r_s
+    residual_d       : signed(17 downto 0);  -- voltage that the described motor does not explain, times t_s, d axis
+    residual_q       : signed(17 downto 0);  -- the same, q axis
+    residual_mean_d  : signed(17 downto 0);  -- mean of residual_d over about 128 samples
+    residual_mean_q  : signed(17 downto 0);  -- mean of residual_q over about 128 samples
+    residual_sixth_d : signed(17 downto 0);  -- mean of the residual turned forward by six times the angle, d axis
+    residual_sixth_q : signed(17 downto 0);  -- the same, q axis
+    residual_power   : unsigned(31 downto 0);  -- mean square of the residual
+    residual_sum     : unsigned(20 downto 0);  -- mean of the absolute sum of the phase currents
+    motor_differs    : std_logic;  -- 1: the motor is not the one described
   end record estimated_t;
 
   constant NOTHING_ESTIMATED : estimated_t := (
-    u_comp_d        => (others => '0'),
-    u_comp_q        => (others => '0'),
-    u_applied_alpha => (others => '0'),
-    u_applied_beta  => (others => '0'),
-    lambda_c_d      => (others => '0'),
-    lambda_c_q      => (others => '0'),
-    lambda_m_alpha  => (others => '0'),
-    lambda_m_beta   => (others => '0'),
-    merge_known     => '0',
-    delta_lambda_d  => (others => '0'),
-    delta_lambda_q  => (others => '0'),
-    delta_held      => '0',
-    lambda_pi_d     => (others => '0'),
-    lambda_pi_q     => (others => '0'),
-    torque          => (others => '0'),
-    flux_faults     => (others => '0'),
-    d_d             => (others => '0'),
-    d_q             => (others => '0'),
-    v_dead          => (others => '0'),
-    v_comp          => (others => '0'),
-    v_comp_limited  => '0',
-    psi_m           => (others => '0'),
-    psi_held        => '0',
-    temp_lost       => '0'
+    u_comp_d         => (others => '0'),
+    u_comp_q         => (others => '0'),
+    u_applied_alpha  => (others => '0'),
+    u_applied_beta   => (others => '0'),
+    lambda_c_d       => (others => '0'),
+    lambda_c_q       => (others => '0'),
+    lambda_m_alpha   => (others => '0'),
+    lambda_m_beta    => (others => '0'),
+    merge_known      => '0',
+    delta_lambda_d   => (others => '0'),
+    delta_lambda_q   => (others => '0'),
+    delta_held       => '0',
+    lambda_pi_d      => (others => '0'),
+    lambda_pi_q      => (others => '0'),
+    torque           => (others => '0'),
+    flux_faults      => (others => '0'),
+    d_d              => (others => '0'),
+    d_q              => (others => '0'),
+    v_dead           => (others => '0'),
+    v_comp           => (others => '0'),
+    v_comp_limited   => '0',
+    psi_m            => (others => '0'),
+    psi_held         => '0',
+    temp_lost        => '0',
+    residual_d       => (others => '0'),
+    residual_q       => (others => '0'),
+    residual_mean_d  => (others => '0'),
+    residual_mean_q  => (others => '0'),
+    residual_sixth_d => (others => '0'),
+    residual_sixth_q => (others => '0'),
+    residual_power   => (others => '0'),
+    residual_sum     => (others => '0'),
+    motor_differs    => '0'
   );
 
   -- register_access: clocks that a write waits for the end of a sample
@@ -1152,6 +1179,25 @@ package fluxproof_pkg is
 
   -- flux_monitor: none: protection and diagnosis of the drive
   constant FLUX_MONITOR_LATENCY : positive := 1;
+
+  -- motor_residual: 001, eq. (5) and (6), as a prediction of the next sample
+  constant MOTOR_RESIDUAL_LATENCY : positive := 38;
+  constant MOTOR_RESIDUAL_RESIDUAL_W : natural := 18;
+  constant MOTOR_RESIDUAL_POWER_W : natural := 32;
+  constant MOTOR_RESIDUAL_SUM_W : natural := 17;
+  constant MOTOR_RESIDUAL_MEAN : natural := 7;
+  constant MOTOR_RESIDUAL_DROP_TWICE : natural := 15;
+  constant MOTOR_RESIDUAL_DROP_TRIG : natural := 16;
+  constant MOTOR_RESIDUAL_DROP_LAMBDA : natural := 9;
+  constant MOTOR_RESIDUAL_DROP_RHO : natural := 10;
+  constant MOTOR_RESIDUAL_DROP_LEG : natural := 11;
+  constant MOTOR_RESIDUAL_DROP_U : natural := 11;
+  constant MOTOR_RESIDUAL_DROP_E : natural := 10;
+  constant MOTOR_RESIDUAL_DROP_POWER : natural := 4;
+  constant MOTOR_RESIDUAL_DROP_OMEGA : natural := 24;
+  constant MOTOR_RESIDUAL_DROP_I : natural := 26;
+  constant MOTOR_RESIDUAL_DROP_SUM_I : natural := 20;
+  constant MOTOR_RESIDUAL_DROP_SUM : natural := 3;
 
   -- psi_adaline: 000, eq. (13), with the reluctance term of eq. (7b)
   constant PSI_ADALINE_LATENCY : positive := 16;

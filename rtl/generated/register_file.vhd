@@ -26,7 +26,8 @@ entity register_file is
     CLOCK_HZ      : natural := 200000000;
     ESTIMATORS    : natural := 1;
     REFERENCES    : natural := 0;
-    POSITION_LOOP : natural := 0
+    POSITION_LOOP : natural := 0;
+    RESIDUAL      : natural := 0
   );
   port (
     clk               : in  std_logic;
@@ -63,8 +64,8 @@ entity register_file is
     speed_mode_in     : out std_logic;  -- 05c 1: speed control, 0: torque control
     temp_winding_in   : out signed(15 downto 0);  -- 060 winding temperature, degrees Celsius
     temp_valid_in     : out std_logic;  -- 064 1: temp_winding is valid
-    irq_mask          : out unsigned(3 downto 0);  -- 068 bit x: cause x of irq_cause does not raise irq
-    irq_clear         : out unsigned(3 downto 0);  -- 06c bit x: clear cause x of irq_cause
+    irq_mask          : out unsigned(4 downto 0);  -- 068 bit x: cause x of irq_cause does not raise irq
+    irq_clear         : out unsigned(4 downto 0);  -- 06c bit x: clear cause x of irq_cause
     ring_arm          : out std_logic;  -- 3c0 1: forget the ring's rows and record
     ring_stop         : out std_logic;  -- 3c4 1: a trigger of the ring, as a trip is
     ring_faults       : out unsigned(16 downto 0);  -- 3c8 bit x: fault x, when it appears, ends the ring; bit 16: a trip
@@ -82,7 +83,7 @@ entity register_file is
     fault_flags       : in  unsigned(15 downto 0);  -- 0cc faults since the last clear_trip, see fault_latch
     first_fault       : in  unsigned(15 downto 0);  -- 0d0 faults that tripped first
     early_samples     : in  unsigned(7 downto 0);  -- 0d4 samples rejected because they came too early
-    irq_cause         : in  unsigned(3 downto 0);  -- 0d8 causes since they were cleared: trip, fault, setting refused, gates gone off
+    irq_cause         : in  unsigned(4 downto 0);  -- 0d8 causes since cleared: trip, fault, setting refused, gates off, motor differs
     ring_recording    : in  std_logic;  -- 3e0 1: the ring records
     ring_ended        : in  std_logic;  -- 3e0 1: the ring has ended, its rows stay
     ring_full         : in  std_logic;  -- 3e0 1: every row of the ring is written
@@ -261,11 +262,11 @@ begin
         written(25)   <= '1';
       end if;
       if (row(3) and column(2)) = '1' then
-        irq_mask    <= unsigned(held(3 downto 0));
+        irq_mask    <= unsigned(held(4 downto 0));
         written(26) <= '1';
       end if;
       if (row(3) and column(3)) = '1' then
-        irq_clear <= unsigned(held(3 downto 0));
+        irq_clear <= unsigned(held(4 downto 0));
       end if;
       if (row(3) and column(4) and not sample_busy) = '1' then
         settings.omega_given <= signed(held(17 downto 0));
@@ -707,6 +708,42 @@ begin
         settings.coulomb <= signed(held(17 downto 0));
         written(174)     <= '1';
       end if;
+      if (row(26) and column(0) and not sample_busy) = '1' then
+        settings.residual_min <= unsigned(held(16 downto 0));
+        written(208)          <= '1';
+      end if;
+      if (row(26) and column(1) and not sample_busy) = '1' then
+        settings.residual_w <= unsigned(held(23 downto 0));
+        written(209)        <= '1';
+      end if;
+      if (row(26) and column(2) and not sample_busy) = '1' then
+        settings.residual_i <= unsigned(held(23 downto 0));
+        written(210)        <= '1';
+      end if;
+      if (row(26) and column(3) and not sample_busy) = '1' then
+        settings.residual_samples <= unsigned(held(11 downto 0));
+        written(211)              <= '1';
+      end if;
+      if (row(26) and column(4) and not sample_busy) = '1' then
+        settings.residual_sum_max <= unsigned(held(17 downto 0));
+        written(212)              <= '1';
+      end if;
+      if (row(26) and column(5) and not sample_busy) = '1' then
+        settings.residual_sum_i <= unsigned(held(21 downto 0));
+        written(213)            <= '1';
+      end if;
+      if (row(27) and column(6) and not sample_busy) = '1' then
+        settings.residual_leg <= unsigned(held(16 downto 0));
+        written(222)          <= '1';
+      end if;
+      if (row(27) and column(7) and not sample_busy) = '1' then
+        settings.residual_light <= signed(held(17 downto 0));
+        written(223)            <= '1';
+      end if;
+      if (row(28) and column(0) and not sample_busy) = '1' then
+        settings.residual_slow <= signed(held(17 downto 0));
+        written(224)           <= '1';
+      end if;
       if (row(30) and column(0)) = '1' then
         ring_arm <= held(0);
       end if;
@@ -862,6 +899,15 @@ begin
         settings.k_inertia        <= (others => '0');
         settings.k_viscous        <= (others => '0');
         settings.coulomb          <= (others => '0');
+        settings.residual_min     <= (others => '0');
+        settings.residual_w       <= (others => '0');
+        settings.residual_i       <= (others => '0');
+        settings.residual_samples <= (others => '0');
+        settings.residual_sum_max <= (others => '0');
+        settings.residual_sum_i   <= (others => '0');
+        settings.residual_leg     <= (others => '0');
+        settings.residual_light   <= (others => '0');
+        settings.residual_slow    <= (others => '0');
         ring_arm                  <= '0';
         ring_stop                 <= '0';
         ring_faults               <= (others => '0');
@@ -1015,15 +1061,16 @@ begin
   shown(6)          <= std_logic_vector(to_unsigned(ESTIMATORS, 32));
   shown(7)          <= std_logic_vector(to_unsigned(REFERENCES, 32));
   shown(8)          <= std_logic_vector(to_unsigned(POSITION_LOOP, 32));
-  shown(9 to 16)    <= (others => (others => '0'));
+  shown(9)          <= std_logic_vector(to_unsigned(RESIDUAL, 32));
+  shown(10 to 16)   <= (others => (others => '0'));
   shown(17)         <= "0000000000000000000000000000000" & clear_trip;
   shown(18)         <= "0000000000000000000000000000000" & clear_faults_in;
   shown(19 to 26)   <= (others => (others => '0'));
   shown(27)         <= std_logic_vector(resize(irq_clear, 32));
   shown(28 to 31)   <= (others => (others => '0'));
-  shown(32)         <= "000000000000000" & observed.regen_limited & double_used & observed.brake_asked &
-                       estimated.delta_held & estimated.merge_known & estimated.temp_lost & estimated.psi_held &
-                       estimated.v_comp_limited & observed.speed_limited & observed.u_dc_low &
+  shown(32)         <= "0000000" & estimated.motor_differs & "0000000" & observed.regen_limited & double_used &
+                       observed.brake_asked & estimated.delta_held & estimated.merge_known & estimated.temp_lost &
+                       estimated.psi_held & estimated.v_comp_limited & observed.speed_limited & observed.u_dc_low &
                        observed.u_dc_at_rail & std_logic_vector(observed.current_at_rail) & setting_refused &
                        tripped & running;
   shown(33)         <= std_logic_vector(resize(estimated.flux_faults, 32));
@@ -1061,7 +1108,16 @@ begin
   shown(101 to 183) <= (others => (others => '0'));
   shown(184)        <= "" & std_logic_vector(resize(observed.shaft_position, 32));
   shown(185)        <= "" & std_logic_vector(resize(observed.position_error, 32));
-  shown(186 to 239) <= (others => (others => '0'));
+  shown(186 to 213) <= (others => (others => '0'));
+  shown(214)        <= "" & std_logic_vector(resize(estimated.residual_d, 32));
+  shown(215)        <= "" & std_logic_vector(resize(estimated.residual_q, 32));
+  shown(216)        <= "" & std_logic_vector(resize(estimated.residual_mean_d, 32));
+  shown(217)        <= "" & std_logic_vector(resize(estimated.residual_mean_q, 32));
+  shown(218)        <= "" & std_logic_vector(resize(estimated.residual_sixth_d, 32));
+  shown(219)        <= "" & std_logic_vector(resize(estimated.residual_sixth_q, 32));
+  shown(220)        <= std_logic_vector(resize(estimated.residual_power, 32));
+  shown(221)        <= std_logic_vector(resize(estimated.residual_sum, 32));
+  shown(222 to 239) <= (others => (others => '0'));
   shown(240)        <= "0000000000000000000000000000000" & ring_arm;
   shown(241)        <= "0000000000000000000000000000000" & ring_stop;
   shown(242 to 247) <= (others => (others => '0'));

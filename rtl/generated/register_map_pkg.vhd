@@ -43,26 +43,27 @@ package body register_map_pkg is
 
   constant ACCESS_OF : access_t :=
   (
-    0 to 8 | 32 to 48 | 50 to 59 | 184 to 185 | 248 to 251 | 256 to 258 | 272 to 282 | 284 to 292                                                   => REGISTER_READ_ONLY,
-    9 to 15 | 31 | 49 | 60 to 63 | 107 | 147 | 158 to 159 | 175 to 183 | 186 to 239 | 252 to 255 | 259 | 266 to 271 | 283 | 293 to 319 | 375 to 511 => REGISTER_NONE,
-    16 to 17 | 19 | 26 to 27 | 240 to 247 | 260 to 265                                                                                              => REGISTER_AT_ONCE,
-    18 | 20 to 25 | 28 to 30 | 64 to 106 | 108 to 146 | 148 to 157 | 160 to 174 | 320 to 374                                                        => REGISTER_BETWEEN
+    0 to 9 | 32 to 48 | 50 to 59 | 184 to 185 | 214 to 221 | 248 to 251 | 256 to 258 | 272 to 282 | 284 to 292                                                    => REGISTER_READ_ONLY,
+    10 to 15 | 31 | 49 | 60 to 63 | 107 | 147 | 158 to 159 | 175 to 183 | 186 to 207 | 225 to 239 | 252 to 255 | 259 | 266 to 271 | 283 | 293 to 319 | 375 to 511 => REGISTER_NONE,
+    16 to 17 | 19 | 26 to 27 | 240 to 247 | 260 to 265                                                                                                            => REGISTER_AT_ONCE,
+    18 | 20 to 25 | 28 to 30 | 64 to 106 | 108 to 146 | 148 to 157 | 160 to 174 | 208 to 213 | 222 to 224 | 320 to 374                                            => REGISTER_BETWEEN
   );
 
   constant RANGE_OF : range_t :=
   (
-    0 to 15 | 31 to 63 | 107 | 147 | 158 to 159 | 161 | 170 to 171 | 175 to 239 | 248 to 259 | 266 to 319 | 375 to 511                                       => to_unsigned(0, REGISTER_RANGE_W),
+    0 to 15 | 31 to 63 | 107 | 147 | 158 to 159 | 161 | 170 to 171 | 175 to 207 | 214 to 221 | 225 to 239 | 248 to 259 | 266 to 319 | 375 to 511             => to_unsigned(0, REGISTER_RANGE_W),
     16 to 19 | 23 | 25 | 29 to 30 | 74 | 83 | 112 | 144 | 148 | 160 | 169 | 240 to 241 | 260 to 262 | 327 | 334 to 336 | 339 | 342 to 343 | 350 to 354 | 368 => to_unsigned(12, REGISTER_RANGE_W),
     20 to 22 | 28 | 67 to 69 | 71 | 90                                                                                                                       => to_unsigned(3, REGISTER_RANGE_W),
     24 | 109 to 111                                                                                                                                          => to_unsigned(4, REGISTER_RANGE_W),
-    26 to 27 | 78 | 347 | 367                                                                                                                                => to_unsigned(16, REGISTER_RANGE_W),
+    26 to 27 | 243 | 265 | 344 | 346                                                                                                                         => to_unsigned(17, REGISTER_RANGE_W),
     64 to 66 | 70 | 95 | 102 | 105 | 132 | 135 | 145 | 150 | 152 | 163 | 247 | 337 | 348 to 349 | 365 | 371 | 373 to 374                                     => to_unsigned(24, REGISTER_RANGE_W),
-    72 | 82 | 91 | 98 | 101 | 103 to 104 | 106 | 115 to 122 | 138 | 143 | 154 | 156 to 157 | 164 | 174 | 242 | 323 | 370                                     => to_unsigned(26, REGISTER_RANGE_W),
+    72 | 82 | 91 | 98 | 101 | 103 to 104 | 106 | 115 to 122 | 138 | 143 | 154 | 156 to 157 | 164 | 174 | 208 | 222 to 224 | 242 | 323 | 370                  => to_unsigned(26, REGISTER_RANGE_W),
     73                                                                                                                                                       => to_unsigned(6, REGISTER_RANGE_W),
-    75 | 263 | 324 | 328 to 329 | 340                                                                                                                        => to_unsigned(27, REGISTER_RANGE_W),
-    76 | 80 to 81 | 84 to 89 | 97 | 108 | 123 | 140 | 142 | 149 | 151 | 153 | 162 | 172 to 173                                                               => to_unsigned(32, REGISTER_RANGE_W),
+    75 | 212 | 263 | 324 | 328 to 329 | 340                                                                                                                  => to_unsigned(27, REGISTER_RANGE_W),
+    76 | 80 to 81 | 84 to 89 | 97 | 108 | 123 | 140 | 142 | 149 | 151 | 153 | 162 | 172 to 173 | 209 to 210                                                  => to_unsigned(33, REGISTER_RANGE_W),
     77                                                                                                                                                       => to_unsigned(25, REGISTER_RANGE_W),
-    79 | 92 to 93 | 130 | 141 | 246 | 325                                                                                                                    => to_unsigned(23, REGISTER_RANGE_W),
+    78 | 347 | 367                                                                                                                                           => to_unsigned(16, REGISTER_RANGE_W),
+    79 | 92 to 93 | 130 | 141 | 211 | 246 | 325                                                                                                              => to_unsigned(23, REGISTER_RANGE_W),
     94 | 113 | 330                                                                                                                                           => to_unsigned(29, REGISTER_RANGE_W),
     96 | 321                                                                                                                                                 => to_unsigned(13, REGISTER_RANGE_W),
     99                                                                                                                                                       => to_unsigned(10, REGISTER_RANGE_W),
@@ -70,11 +71,11 @@ package body register_map_pkg is
     114                                                                                                                                                      => to_unsigned(30, REGISTER_RANGE_W),
     124 to 129 | 131 | 133 | 136 to 137                                                                                                                      => to_unsigned(21, REGISTER_RANGE_W),
     134 | 146 | 320 | 331                                                                                                                                    => to_unsigned(22, REGISTER_RANGE_W),
-    139                                                                                                                                                      => to_unsigned(31, REGISTER_RANGE_W),
-    155 | 165 to 166 | 326                                                                                                                                   => to_unsigned(33, REGISTER_RANGE_W),
+    139                                                                                                                                                      => to_unsigned(32, REGISTER_RANGE_W),
+    155 | 165 to 166 | 326                                                                                                                                   => to_unsigned(34, REGISTER_RANGE_W),
     167                                                                                                                                                      => to_unsigned(14, REGISTER_RANGE_W),
     168 | 355 to 358                                                                                                                                         => to_unsigned(15, REGISTER_RANGE_W),
-    243 | 265 | 344 | 346                                                                                                                                    => to_unsigned(17, REGISTER_RANGE_W),
+    213                                                                                                                                                      => to_unsigned(31, REGISTER_RANGE_W),
     244 to 245                                                                                                                                               => to_unsigned(2, REGISTER_RANGE_W),
     264                                                                                                                                                      => to_unsigned(1, REGISTER_RANGE_W),
     322                                                                                                                                                      => to_unsigned(28, REGISTER_RANGE_W),
@@ -89,8 +90,8 @@ package body register_map_pkg is
 
   constant SIGNED_OF : signed_t :=
   (
-    0 to 34 | 36 | 40 | 49 to 183 | 186 to 511 => '0',
-    35 | 37 to 39 | 41 to 48 | 184 to 185      => '1'
+    0 to 34 | 36 | 40 | 49 to 183 | 186 to 213 | 220 to 511 => '0',
+    35 | 37 to 39 | 41 to 48 | 184 to 185 | 214 to 219      => '1'
   );
 
   constant LOW_OF : low_t :=
@@ -111,7 +112,7 @@ package body register_map_pkg is
 
   constant HIGH_OF : high_t :=
   (
-    0 | 33   => to_signed(2147483647, REGISTER_LIMIT_W),
+    0 | 34   => to_signed(2147483647, REGISTER_LIMIT_W),
     1        => to_signed(33554431, REGISTER_LIMIT_W),
     2 | 27   => to_signed(262143, REGISTER_LIMIT_W),
     3 | 26   => to_signed(131071, REGISTER_LIMIT_W),
@@ -137,9 +138,10 @@ package body register_map_pkg is
     28       => to_signed(524287, REGISTER_LIMIT_W),
     29       => to_signed(1048575, REGISTER_LIMIT_W),
     30       => to_signed(1179647, REGISTER_LIMIT_W),
-    31       => to_signed(8388607, REGISTER_LIMIT_W),
-    32       => to_signed(16777215, REGISTER_LIMIT_W),
-    34 to 63 => to_signed(0, REGISTER_LIMIT_W)
+    31       => to_signed(4194303, REGISTER_LIMIT_W),
+    32       => to_signed(8388607, REGISTER_LIMIT_W),
+    33       => to_signed(16777215, REGISTER_LIMIT_W),
+    35 to 63 => to_signed(0, REGISTER_LIMIT_W)
   );
 
   function register_access_of (word : unsigned(REGISTER_WORD_W - 1 downto 0)) return unsigned is

@@ -4,8 +4,9 @@
 --         1  a fault appeared in fault_flags, whether it trips or not
 --         2  dead_time and min_pulse contradict each other (setting_refused)
 --         3  the gates were on and are off
+--         4  the motor is not the one described (motor_differs)
 --   irq = a cause that irq_mask does not mask
--- A cause stays until irq_clear has a one in its bit; what is still present (0, 2) sets it again at once.
+-- A cause stays until irq_clear has a one in its bit; what is still present (0, 2, 4) sets it again at once.
 -- Formats: bits.  Latency: 1 (every clock is a sample).  Rounding: none.
 
 library ieee;
@@ -22,23 +23,24 @@ entity interrupts is
     fault_flags     : in  unsigned(15 downto 0);
     setting_refused : in  std_logic;
     running         : in  std_logic;
-    irq_mask        : in  unsigned(3 downto 0);
-    irq_clear       : in  unsigned(3 downto 0);
-    irq_cause       : out unsigned(3 downto 0);
+    motor_differs   : in  std_logic;
+    irq_mask        : in  unsigned(4 downto 0);
+    irq_clear       : in  unsigned(4 downto 0);
+    irq_cause       : out unsigned(4 downto 0);
     irq             : out std_logic
   );
 end entity interrupts;
 
 architecture rtl of interrupts is
   -- State
-  signal causes : unsigned(3 downto 0);
+  signal causes : unsigned(4 downto 0);
   signal flags  : unsigned(15 downto 0);
   signal was_on : std_logic;
 
-  signal now_0    : unsigned(3 downto 0);
-  signal causes_0 : unsigned(3 downto 0);
+  signal now_0    : unsigned(4 downto 0);
+  signal causes_0 : unsigned(4 downto 0);
 begin
-  now_0    <= (was_on and not running) & setting_refused & (or (fault_flags and not flags)) & tripped;
+  now_0    <= motor_differs & (was_on and not running) & setting_refused & (or (fault_flags and not flags)) & tripped;
   causes_0 <= (causes and not irq_clear) or now_0;
 
   process (clk)

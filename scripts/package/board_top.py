@@ -77,7 +77,8 @@ LINES = (
     "    given.speed_given      := speed_now;",
     "    given.position_restart := settings.position_restart or position_restart;",
     "    if forced = '1' then",
-    "      given.emf_samples := (others => '0');",
+    "      given.emf_samples      := (others => '0');",
+    "      given.residual_samples := (others => '0');",
     "    end if;",
     "    core_settings          <= given;",
     "  end process;",
@@ -120,7 +121,8 @@ BOARD = Top(
         "SPI_LINES": ("integer range 1 to 4", 4, "data lines of the SPI converters"),
     },
     _pins(),
-    LINES,
-    frozenset({"settings", "omega_now", "speed_now", "position_restart", "forced", "trip_now", "board_stop"}),
-    {"core_settings": "settings_t", "core_trip": "std_logic"},
+    LINES + axi_top.LINES,
+    frozenset({"settings", "omega_now", "speed_now", "position_restart", "forced", "trip_now", "board_stop"})
+    | axi_top.LINES_READ,
+    {"core_settings": "settings_t", "core_trip": "std_logic", **axi_top.LINES_DRIVE},
 )

@@ -22,6 +22,7 @@ GENERICS = {
     "ESTIMATORS": 1,
     "REFERENCES": 0,
     "POSITION_LOOP": 0,
+    "RESIDUAL": 0,
 }  # as in the core
 BOARD_GENERICS = {"ENCODER": 1, "CURRENTS": 1, "SPI_LINES": 4}
 BETWEEN, AT_ONCE = ("setting", "sample pulse"), ("command", "pulse")

@@ -32,6 +32,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "compensation",
         "torque_estimate",
         "monitor",
+        "residual",
     ),
     # transforms, speed and current regulators, decoupling, limit of the voltage, delay compensation
     "field_oriented_control": (

@@ -26,6 +26,7 @@ GENERICS = {
     "estimators": 0,
     "references": 1,
     "position_loop": 1,
+    "residual": 1,
 }
 MAP = registers()
 WRITABLE = [r for r in MAP.values() if r.kind.writable]

@@ -17,6 +17,7 @@ GENERICS = {
     "ESTIMATORS": 1,
     "REFERENCES": 0,
     "POSITION_LOOP": 0,
+    "RESIDUAL": 0,
     "DEPTH_BITS": 9,
 }
 
@@ -48,7 +49,8 @@ architecture test of {NAME} is
 begin
   core : entity work.fluxproof
     generic map (ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS, CARRIER_HALF => CARRIER_HALF,
-                 ESTIMATORS => ESTIMATORS, REFERENCES => REFERENCES, POSITION_LOOP => POSITION_LOOP)
+                 ESTIMATORS => ESTIMATORS, REFERENCES => REFERENCES, POSITION_LOOP => POSITION_LOOP,
+                 RESIDUAL => RESIDUAL)
     port map ({", ".join(f"{name} => {name}" for name in core)});
   stream : entity work.telemetry
     generic map (ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS, DEPTH_BITS => DEPTH_BITS)

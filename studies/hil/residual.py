@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The residual beside the motor: healthy drives at random speeds and currents, and single faults in steady running.
+
+The plant switches with dead time and device drops; its sensors have noise.  The core has the registers of the drive
+file.  A healthy motor has R, L_d, L_q and magnets 1 to 2 % off, and sensors 0.1 % apart.  A fault is there from the
+first sample, and so is steady running: time counts from there.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from fluxproof.checkout import DRIVES
+from fluxproof.cosim.closed_loop import Result
+from fluxproof.cosim.driven_plant import Scenario, described_sensors
+from fluxproof.cosim.golden_loop import simulate
+from fluxproof.plant import IMPOSED_SPEED, Machine
+from fluxproof.plant.sensors import Sensors
+from fluxproof.simulate.run import inverter_of, machine_of
+from golden_model.drive import Drive, load
+from golden_model.front_ends import Converters, Encoder
+from golden_model.registers import registers
+from golden_model.units import from_si, si_per_lsb
+from studies.hil.figure import least, most
+
+NAMES = ("paper001", "servo_24v", "spindle_400v", "emrax228", "hub_36v")
+NOISE = 0.001  # of the rated current
+WRONG, APART = (0.01, 0.02), 0.001  # parameters of a healthy motor; gains of its sensors
+TARGET_S, STEADY_S = 0.05, 0.08
+SEGMENT = 20_000  # samples with the same motor
+SPEEDS, CHANGES = (-0.8, 0.8), 25  # of the rated speed; of speed and current in a segment
+SEED = 53
+
+
+def drive_of(name: str) -> Drive:
+    """The drive file with a residual; codes come from ideal front ends."""
+    drive = load(DRIVES / f"{name}.toml")
+    core = dataclasses.replace(drive.core, residual=True)
+    return dataclasses.replace(drive, core=core, encoder=Encoder(), converters=Converters())
+
+
+def play(drive: Drive, machine: Machine, sensors: Sensors, speed: np.ndarray, i_q: np.ndarray) -> Result:
+    """A driven shaft with this speed [rad/s] and these currents [A] asked for, a value a sample."""
+    n, volts = len(speed), drive.inverter.dc_bus_v
+    asked = np.array([from_si("i_q_ext", i, drive) for i in i_q], np.int64)
+    nothing = np.zeros(n, np.int64)
+    scenario = Scenario(
+        omega_ref=nothing, load=speed, u_dc=np.full(n, volts), i_d_ref=nothing, i_q_ext=asked, speed_mode=nothing,
+        enable=np.ones(n, np.int64), omega_m=float(speed[0]),
+    )  # fmt: skip
+    return simulate(
+        drive, registers(drive), scenario, machine, sensors, drive.inverter.dead_time_s, IMPOSED_SPEED,
+        inverter=inverter_of(drive),
+    )  # fmt: skip
+
+
+def noisy(drive: Drive, seed: int, **changes) -> Sensors:
+    """The described sensors with noise and these errors."""
+    noise = NOISE * drive.machine.rated_current_a
+    return dataclasses.replace(described_sensors(drive), current_noise_a=noise, seed=seed, **changes)
+
+
+def healthy(drive: Drive, segment: int) -> Result:
+    """A segment of a healthy drive: speed in ramps, currents in steps, both drawn."""
+    rng = np.random.default_rng((SEED, segment))
+    described = machine_of(drive, imposed=True)
+    names = ("resistance_ohm", "inductance_d_h", "inductance_q_h", "magnet_flux_wb")
+    off = {n: getattr(described, n) * (1.0 + rng.uniform(*WRONG) * rng.choice((-1, 1))) for n in names}
+    at = np.linspace(0, SEGMENT, CHANGES)
+    speed = np.interp(np.arange(SEGMENT), at, rng.uniform(*SPEEDS, CHANGES)) * drive.machine.rated_speed_rad_s
+    amperes = rng.uniform(-1.0, 1.0, CHANGES) * drive.machine.rated_current_a
+    i_q = np.repeat(amperes, -(-SEGMENT // CHANGES))[:SEGMENT]
+    sensors = noisy(drive, segment, current_gain_error=tuple(rng.uniform(-APART, APART, 3)))
+    return play(drive, dataclasses.replace(described, **off), sensors, speed, i_q)
+
+
+class Fault(NamedTuple):
+    """What is wrong, and where: shares of the rated current and speed, which is at least what is watched."""
+
+    name: str
+    speed: float
+    current: float
+    machine: Callable[[Machine], dict] = lambda _m: {}
+    sensors: Callable[[Drive], dict] = lambda _d: {}
+
+
+FAULTS = (
+    Fault("magnets 5 % weaker", 0.8, 0.3, machine=lambda m: {"magnet_flux_wb": 0.95 * m.magnet_flux_wb}),
+    Fault("R 30 % higher", 0.0, 1.0, machine=lambda m: {"resistance_ohm": 1.3 * m.resistance_ohm}),
+    Fault("a sensor 2 % high", 0.3, 1.0, sensors=lambda _d: {"current_gain_error": (0.02, 0.0, 0.0)}),
+    Fault(
+        "a sensor's zero off by 0.5 % of rated", 0.3, 0.3,
+        sensors=lambda d: {"current_offset_a": (0.005 * d.machine.rated_current_a, 0.0, 0.0)},
+    ),
+    Fault(
+        "encoder slipped by 10 electrical degrees", 0.3, 0.3,
+        sensors=lambda d: {"position_offset_rad": math.radians(10) / d.machine.pole_pairs},
+    ),
+)  # fmt: skip
+
+
+def until_flag(drive: Drive, fault: Fault) -> float:
+    """Time from the first sample to the flag [s]; infinite without one."""
+    described, n = machine_of(drive, imposed=True), round(STEADY_S / drive.sample_time_s)
+    machine = dataclasses.replace(described, **fault.machine(described))
+    watched = registers(drive).values.residual_slow * si_per_lsb("omega_me", drive) / drive.machine.pole_pairs
+    speed = np.full(n, max(fault.speed * drive.machine.rated_speed_rad_s, 1.15 * watched))
+    i_q = np.full(n, fault.current * drive.machine.rated_current_a)
+    result = play(drive, machine, noisy(drive, SEED, **fault.sensors(drive)), speed, i_q)
+    flagged = np.flatnonzero(result.observed["motor_differs"])
+    return flagged[0] * drive.sample_time_s if len(flagged) else math.inf
+
+
+def figures(options) -> list[dict]:
+    """No flag of a healthy drive; each fault of each drive within its time."""
+    drives = [drive_of(name) for name in NAMES]
+    segments, flags = max(round(options.samples / SEGMENT), 1), 0
+    for k in range(segments):
+        flags += int(np.count_nonzero(healthy(drives[k % len(drives)], k).observed["motor_differs"]))
+    rows = [
+        most("residual: samples with a flag of healthy drives", flags, 0, "samples"),
+        least("residual: samples of healthy drives", segments * SEGMENT, 1_000_000, "samples"),
+    ]
+    for fault in FAULTS:
+        times = [until_flag(drive, fault) for drive in drives]
+        rows.append(most(f"residual: {fault.name}, flag of the last of {len(times)} drives", max(times), TARGET_S, "s"))
+    return rows
