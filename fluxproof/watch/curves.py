@@ -23,9 +23,9 @@ def plot(title: str, names: tuple[str, ...], unit: str, sources: dict[str, Colum
     for name in names:
         sources[name] = ColumnDataSource({"x": [], "y": []})
         made.line("x", "y", source=sources[name], color=COLOURS[name], legend_label=name, name=name)
-    made.legend.orientation, made.legend.border_line_color = "horizontal", None
-    made.legend.padding = made.legend.margin = 0
-    made.add_layout(made.legend[0], "above")  # beside the curves, never over them
+    legend = made.legend[0]
+    legend.update(orientation="horizontal", border_line_color=None, padding=0, margin=0)
+    made.add_layout(legend, "above")  # beside the curves, never over them
     return made
 
 

@@ -6,10 +6,10 @@ from __future__ import annotations
 import asyncio
 import io
 from html import escape
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from bokeh.document import Document, without_document_lock
+from bokeh.document import without_document_lock
 from bokeh.layouts import column, row
 from bokeh.models import Button, ColumnDataSource, CustomJS, Div, Select, Toggle
 from bokeh.plotting import figure
@@ -62,7 +62,7 @@ def parquet_of(look: Look, drive: Drive) -> bytes:
     return out.getvalue()
 
 
-def view(doc: Document, scene: Scene) -> None:
+def view(doc: Any, scene: Scene) -> None:
     """One browser's view."""
     live, drive = scene.live, scene.drive
     sources: dict[str, ColumnDataSource] = {}
@@ -114,7 +114,10 @@ def view(doc: Document, scene: Scene) -> None:
             data = {"file": [np.frombuffer(file, np.uint8).tolist()]}
             doc.add_next_tick_callback(lambda: carried.update(data=data))
 
-    export.on_click(lambda: doc.add_next_tick_callback(save))
+    def ask_save() -> None:
+        doc.add_next_tick_callback(save)
+
+    export.on_click(ask_save)
     controls = column(row(window, hold, trigger), export, digital, said, flags, why, circle, width=WIDE)
     doc.add_root(row(column(*plots, sizing_mode="stretch_width"), controls, sizing_mode="stretch_width"))
     doc.add_root(carried_root(carried))

@@ -9,18 +9,18 @@ from __future__ import annotations
 import hmac
 import secrets
 from collections.abc import Callable
+from typing import Any
 
-from bokeh.document import Document
 from bokeh.models import Div
 from bokeh.server.server import Server
 
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 
-def serve(view: Callable[[Document], None], address: str, port: int, token: str | None = None) -> tuple[Server, str]:
+def serve(view: Callable[[Any], None], address: str, port: int, token: str | None = None) -> tuple[Server, str]:
     """(the server, started; the address of its page); ``view`` fills a document for each browser."""
 
-    def guarded(doc: Document) -> None:
+    def guarded(doc: Any) -> None:  # a Document of bokeh, whose request its types do not know
         doc.title = "Fluxproof"
         if allowed(token, doc.session_context.request.arguments):
             view(doc)

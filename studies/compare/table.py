@@ -52,7 +52,7 @@ def note(result: dict) -> str:
     c, seed = result["cases"], result["tuned_on_seed"]
     return (
         f"Sealed cases of seed {result['seed']}: {c['single']} single effects, {c['pair']} pairs, "
-        f"{c['healthy']} healthy drives. The three other methods use the preparation and balance of the diagnosis, "
+        f"{c['healthy']} healthy drives. The other methods use the preparation and balance of the diagnosis, "
         f'and thresholds tuned for the most correct names on seed {seed}. "Named right" counts identifiable effects; '
         "95 % intervals in brackets."
     )
