@@ -40,6 +40,8 @@ SILENT += ("watchdog", "i_trip", "sum_trip", "rail_samples", "u_dc_min", "u_dc_m
 SILENT += ("omega_trip", "omega_away", "runaway_samples", "omega_stall", "stall_samples", "i_open", "offset_max")
 SILENT += ("heartbeat", "brake_off", "emf_min", "emf_l", "emf_i", "emf_w", "emf_samples", "regen_start")
 SILENT += tuple(name for name in fluxproof.REGISTERS if name.startswith("residual_"))  # the recorded core has none
+SILENT += ("position_mode", "position_kp", "position_band", "omega_most", "position_target", "move_speed", "move_step")
+SILENT += ("jerk_bits", "use_stops", "stop_low", "stop_high", "torque_lead", "k_inertia", "k_viscous", "coulomb")
 SILENT += ("use_table", "k_flux", "u_share", "k_voltage", "share_min", "k_torque", "omega_learn", "torque_step")
 SILENT += ("table_word",)  # without the torque table
 # Of these registers a recording has what each sample had; one without these signals is replayed with the registers.
