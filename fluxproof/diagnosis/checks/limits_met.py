@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rows at the current's or the power's limit are told: their values hold, but the drive was not free to follow.
 
-At a limit a quantity stays at its largest value while the speed goes on; a step of a test plan stays at one speed.  The
-power may fall with a temperature that rises, as a protection asks for.
+At a limit a quantity stays at its largest value while the speed goes on; a step of a test plan stays at one speed, or
+smaller values stay as well while the speed goes on.  The power may fall with a temperature that rises, as a protection
+asks for.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ CROWDED = 4.0  # times as many rows as in the bands beside it
 LEAST, LEAST_SHARE = 5, 0.02  # rows of a stretch; share of all rows at the limit
 MOVES = 0.1  # of the largest speed: what it changes by within the longest stretch
 LOADED = 0.3  # of rated current: below it nothing is limited
+FAST, SMALL, MOST = 0.25, 0.1, 0.5  # of the fastest change of speed; of the largest value; share of rows that stay
 
 
 def check(recording, nominal) -> None:
@@ -49,6 +51,8 @@ def _told(recording, size, name: str, unit: str, least: float) -> bool:
     stretches = [omega[a : a + n] for a, n in zip(first, length, strict=True)]
     if max(float(np.ptp(np.abs(x))) for x in stretches) <= MOVES * float(np.abs(omega).max()):
         return False
+    if _planned(omega, size, top, at):
+        return False
     longest = int(np.argmax(length))
     until = t[first[longest] + length[longest] - 1]
     more = f", and in {counted(len(first) - 1, 'other part')}," if len(first) > 1 else ""
@@ -59,6 +63,13 @@ def _told(recording, size, name: str, unit: str, least: float) -> bool:
     problem = Problem(f"{name}_limit", message, "", int(first[longest]), int(length.sum()), "rows used")
     recording.problems.append(problem)
     return True
+
+
+def _planned(omega, size, top: float, at) -> bool:
+    """Whether smaller values stay while the speed changes, too: then the plan asks for them, and for the largest."""
+    moved, change = np.abs(omega[LEAST:] - omega[:-LEAST]), np.abs(size[LEAST:] - size[:-LEAST])
+    free = (moved > FAST * moved.max()) & ~at[LEAST:] & ~at[:-LEAST] & (size[LEAST:] > SMALL * top)
+    return np.count_nonzero(free) >= LEAST and float(np.mean(change[free] <= BAND * top)) > MOST
 
 
 def _level(size) -> float | None:
