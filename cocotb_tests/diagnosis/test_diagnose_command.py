@@ -112,7 +112,7 @@ def test_the_improved_drive_is_one_that_registers_takes(explained, capsys):
     assert load_nominal(path).machine.magnet_flux_wb == pytest.approx(FLUX, rel=2e-3)
     before, after = registers(bench.DRIVE).values, registers(drives.load(path)).values
     changed = {name for name in before._fields if getattr(before, name) != getattr(after, name)}
-    follow = {"delta_max", "speed_kp", "speed_ki", "emf_min", "emf_w"}
+    follow = {"delta_max", "speed_kp", "speed_ki", "emf_min", "emf_w", "residual_min", "residual_w"}
     assert "lambda_mg" in changed and not changed - follow - {"lambda_mg"}, changed
     assert fluxproof.main(["registers", str(path)]) == 0 and "lambda_mg" in capsys.readouterr().out
 

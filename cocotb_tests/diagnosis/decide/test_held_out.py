@@ -33,24 +33,48 @@ def test_a_name_whose_size_is_compatible_with_zero_has_none(name):
         assert has_size(found, effect, c, NOMINAL) is seen, (sigmas, c, found)
 
 
+def found_set(c, explains):
+    """A set with these coefficients, each effect explaining this part (2,) of the misfit per unit of its relevance."""
+    sizes = {n: CATALOGUE[n].size(c[n], NOMINAL) / CATALOGUE[n].relevant(NOMINAL) for n in c}
+    parts = {n: np.sign(next(iter(c[n].values()))) * sizes[n] * np.array(explains[n]) for n in c}
+    problem = SimpleNamespace(
+        setup=SimpleNamespace(effects=CATALOGUE, cells=SimpleNamespace(ok=np.ones(2, bool)), usual=np.ones(2)),
+        view=SimpleNamespace(nominal=NOMINAL), y=np.zeros(2),
+    )  # fmt: skip
+    return SimpleNamespace(problem=problem, names=tuple(c), c=c, left=lambda names: -sum(parts[n] for n in names))
+
+
+@pytest.mark.parametrize(("first", "second", "alike", "acted_on"), [
+    (0.7, 0.7, (1.0, 0.0), True), (0.4, 0.4, (1.0, 0.0), False), (3.0, -3.0, (1.0, 0.2), False),
+    (3.0, 0.1, (0.0, 1.0), True),
+])  # fmt: skip
+def test_causes_of_one_misfit_count_together(first, second, alike, acted_on):
+    """Two halves of a cause that matters are one that matters; two causes that cancel are none."""
+    c = {
+        "resistance": {"r": first * CATALOGUE["resistance"].relevant(NOMINAL)},
+        "magnet_flux": {"psi": second * CATALOGUE["magnet_flux"].relevant(NOMINAL)},
+    }
+    fit = found_set(c, {"resistance": (1.0, 0.0), "magnet_flux": alike})
+    found = relevant_names(Names({}, (("resistance", "magnet_flux"),), {}, fits=((1.0, fit),)), fit)
+    assert bool(found.ambiguous) is acted_on
+
+
 @pytest.mark.parametrize("name", sorted(KEYS))
 def test_what_is_too_small_to_act_on_makes_no_verdict_and_hides_no_cause(name):
     """Offsets of 7 +- 4 mA of 15 A were explained; alone, beside a cause, and as an alternative to another one."""
     effect = CATALOGUE[name]
-    problem = SimpleNamespace(setup=SimpleNamespace(effects=CATALOGUE), view=SimpleNamespace(nominal=NOMINAL))
     for times in np.random.default_rng(5).uniform(0.1, 3.0, 20).tolist():
         small = times * effect.relevant(NOMINAL)
-        fit = SimpleNamespace(
-            problem=problem, names=(name, "dead_time"), c={name: {KEYS[name]: small}, "dead_time": {"v_0.02": 9.0}}
-        )
+        fit = found_set({name: {KEYS[name]: small}, "dead_time": {"v_0.02": 9.0}}, {name: (1, 0), "dead_time": (0, 1)})
         found = relevant_names(Names({name: 0.99, "dead_time": 0.99}, (), {}, fits=((1.0, fit),)), fit)
         assert "dead_time" in found.named and (name in found.named) is (times >= 1.0)
         assert (name in found.minor) is (times < 1.0) and name not in found.only_possible(fit)
         either = relevant_names(Names({}, ((name, "dead_time"),), {}, fits=((1.0, fit),)), fit)
         assert either.ambiguous == ((name, "dead_time"),)  # one of them is large
-        little = SimpleNamespace(problem=problem, names=("dead_time",), c={"dead_time": {"v_0.02": 1e-6}})
-        both = Names({}, ((name, "dead_time"),), {}, fits=((0.6, fit), (0.4, little)))
-        assert not relevant_names(both, fit).ambiguous  # nothing large is not improbable
+        little = found_set({"dead_time": {"v_0.02": 1e-6}}, {"dead_time": (0, 1)})
+        for share, told in ((0.5, False), (0.9, True)):  # of the sets with something large
+            both = Names({}, ((name, "dead_time"),), {}, fits=((share, fit), (1.0 - share, little)))
+            assert bool(relevant_names(both, fit).ambiguous) is told
 
 
 def test_a_mean_torque_counts_beside_the_noise_of_its_ripple(monkeypatch):

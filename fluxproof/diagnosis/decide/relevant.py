@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from fluxproof.diagnosis.ground import constants as k
 
 
 def relevant_names(names, best):
     """Names without effects that are too small to act on, which become ``minor``; best: the most probable set.
 
-    An alternative is too small where sets that explain the same with nothing that is large enough to act on are not
-    improbable: two causes that all but cancel stood beside a bus voltage that is off by 0.05 %.
+    An ambiguity counts where its effects are probably large enough to act on; else its members are notes.
     """
     groups = tuple(g for g in names.ambiguous if _is_acted_on(g, names.fits))
     dropped = {n for g in set(names.ambiguous) - set(groups) for n in g if n in best.names}
@@ -27,14 +28,34 @@ def relevant_names(names, best):
 
 
 def _is_acted_on(group, kept) -> bool:
-    """Whether an effect of a group is there and large enough to act on, in all but improbable sets.
+    """Whether effects of a group are probably large enough to act on, where any of them is there.
 
-    An effect that is in none of the sets, as a factor that no voltage tells from another, has no size that speaks
+    A group that is in none of the sets, as a factor that no voltage tells from another, has no size that speaks
     against it.
     """
-    with_one = [(p, fit, set(group) & set(fit.names)) for p, fit in kept]
-    large = sum(p for p, fit, mine in with_one if any(not is_minor(fit, n) for n in mine))
-    return large >= (1.0 - k.DOUBTED) * sum(p for p, _, mine in with_one if mine)
+    there = [(p, fit, mine) for p, fit in kept if (mine := set(group) & set(fit.names))]
+    large = sum(p for p, fit, mine in there if _is_large(fit, mine))
+    return not there or large > k.ACTED_ON * sum(p for p, _, _ in there)
+
+
+def _is_large(fit, mine) -> bool:
+    """Whether effects of a set explain together at least what one of them does where it is just worth acting on.
+
+    Two that share a misfit may be small alone, and two that cancel may be large.
+    """
+    setup, nominal = fit.problem.setup, fit.problem.view.nominal
+    rows = setup.cells.ok
+
+    def explained(names) -> float:
+        return float(np.linalg.norm(((fit.problem.y - fit.left(names)) / setup.usual)[rows]))
+
+    together = explained(mine)
+    for name in mine:
+        effect = setup.effects[name]
+        times = effect.size(fit.c[name], nominal) / effect.relevant(nominal)
+        if together * times >= explained((name,)):
+            return True
+    return False
 
 
 def is_minor(fit, name) -> bool:

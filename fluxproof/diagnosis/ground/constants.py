@@ -62,6 +62,8 @@ READ_POINTS = 3
 # ---- what is reported
 # Largest probability of absence at which an effect, or one effect of an alternative, is still reported.
 DOUBTED = 0.05
+# Probability that one of several causes is large enough to act on, from which their ambiguity is reported.
+ACTED_ON = 2 / 3
 # Probability mass of the least probable sets, which are ignored.
 LEFT_OUT = 0.05
 # Least probability of an effect in an ambiguity.
