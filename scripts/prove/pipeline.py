@@ -89,6 +89,11 @@ def fault_files(block: Block) -> list[str]:
 # Code patterns of the blocks in the order of preference: (what the fault breaks, text, its replacement).
 PATTERNS = (
     ("valid a clock early", "out_valid <= valid(LATENCY);", "out_valid <= valid(LATENCY - 1);"),
+    (
+        "valid a clock early",
+        "out_valid <= '1' when n = LATENCY else '0';",
+        "out_valid <= '1' when n = LATENCY - 1 else '0';",
+    ),
     ("valid survives reset", "        valid(1 to LATENCY) <= (others => '0');\n", "        null;\n"),
     ("valid survives reset", "out_valid <= '0';", "null;"),
 )
