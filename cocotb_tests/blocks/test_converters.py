@@ -104,10 +104,10 @@ def spi_cores():
     return {bits: VerilatedCore({"ADC_BITS": bits, "LINES": LINES}, top="spi_converter") for bits in (16, 12)}
 
 
-@pytest.mark.parametrize("share", [8, pytest.param(1, marks=pytest.mark.study)])
+@pytest.mark.parametrize("share", [16, pytest.param(1, marks=pytest.mark.study)])
 @pytest.mark.parametrize("kind", SPI_KINDS)
 def test_spi_codes_are_those_held(kind, share, spi_cores):
-    """Clock ratios 4 to 16 with both ends of sample_delay; 10^4 conversions over the kinds, or an eighth."""
+    """Clock ratios 4 to 16 with both ends of sample_delay; 10^4 conversions over the kinds, or a sixteenth."""
     bits, total = SPI_KINDS[kind][0][0], 0
     for ratio in range(4, 17):
         possible = delays(kind, ratio)

@@ -83,6 +83,7 @@ def board(request, drive):
     return lambda **options: RtlBoard(drive, **options)
 
 
+@pytest.mark.parametrize("board", ["golden", slowly("rtl")], indirect=True)
 def test_brings_the_motor_to_speed_and_stops_it(board, drive, program):
     board = board()
     done = board.run(program, "300")

@@ -120,6 +120,7 @@ class RtlBus:
         self.stream += words[words[:, 0] == 1, 1].tolist()
 
 
+@pytest.mark.slow
 def test_ring_of_the_top_holds_the_rows_of_its_stream(ghdl5):
     """Through the pins of the converted top: the rows before a trip and those after it, word by word."""
     drive = drives.with_carrier(DRIVE, 100)

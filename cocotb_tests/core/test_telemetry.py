@@ -76,6 +76,7 @@ def renumbered(words, first):
     return words
 
 
+@pytest.mark.slow
 def test_stream_to_replay(folder, tmp_path, capsys):
     """The core's own stream: dump, replay equal in every bit; one bit of one register flipped: block and sample."""
     drive = drives.with_carrier(DRIVE, CARRIER_HALF)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 
 import numpy as np
+import pytest
 
 from cocotb_tests.support.core.converted import differences, trace_of_verilog, trace_of_vhdl
 from fluxproof.cosim.verilated import VerilatedCore
@@ -100,6 +101,7 @@ def stimulus(seed: int) -> list[dict[str, int]]:
     return writes
 
 
+@pytest.mark.slow
 def test_axi_top_equals_vhdl_clock_by_clock(ghdl5, tmp_path, capsys):  # noqa: F811
     seed = int(os.environ.get("FLUXPROOF_SEED", "1"))
     core = VerilatedCore(GENERICS, top=TOP)

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.drives import PAPER
+from cocotb_tests.support.slow import slowly
 from fluxproof.cosim import recording as recordings
 from fluxproof.cosim import runs, verilog
 from fluxproof.cosim.golden_loop import run_controller
@@ -221,7 +222,7 @@ def test_the_telemetry_of_the_rtl_is_that_of_the_golden_model(tmp_path, monkeypa
         assert np.array_equal(observed[:, k], arrays[f"observed_{name}"]), name
 
 
-@pytest.mark.parametrize("engine", [runs.InVerilator, runs.InGhdl])
+@pytest.mark.parametrize("engine", [slowly(runs.InVerilator), runs.InGhdl])
 def test_replay(log, engine, tmp_path, monkeypatch):
     """A recording in both engines, equal in every bit of every sample, the demo's way."""
     if engine is runs.InVerilator:

@@ -164,15 +164,15 @@ def stimuli(rng, _config):
             position = wrap_s(position + shaft, POSITION_W)
             rows.append({**calm, **given, "shaft_position": position})
 
-    for bits in (0, 1, 2, 3, 0):
+    for bits in (0, 2, 0):
         pace = {"jerk_bits": bits, "torque_lead": (2 * bits + 1) % 8, "move_speed": 1 << 24, "move_step": 3 << 23}
         for target in (0, 1, -1, 5000, 5000, -70000, 3 << 18):
             move(6 << 3 + bits, **pace, position_target=target)
         move(4 << 3 + bits, shaft=300, **pace, position_mode=0)
         move(4 << 3 + bits, shaft=-300, **pace, position_mode=0)
         move(8 << 3 + bits, **pace, position_target=position)
-    for _ in range(60):
-        pace = {"jerk_bits": int(rng.integers(2)), "torque_lead": int(rng.integers(8))}
+    for _ in range(30):
+        pace = {"jerk_bits": int(rng.integers(4)), "torque_lead": int(rng.integers(8))}
         pace |= {"move_speed": int(2 ** rng.uniform(8, 31)), "move_step": int(2 ** rng.uniform(8, 31))}
         pace |= {"k_speed": int(2 ** rng.uniform(8, 24)), "k_filter": int(rng.integers(1 << 16))}
         pace |= {"k_viscous": int(2 ** rng.uniform(0, 24)), "coulomb": int(2 ** rng.uniform(0, 17))}

@@ -25,7 +25,7 @@ def test_an_angle_off_by_any_part_of_a_turn_is_found(degrees, tmp_path):
     assert abs(np.degrees(offset.value) - degrees) < 1.0 and offset.sigma < 0.02
 
 
-@pytest.mark.parametrize("factor", [0.3, slowly(1.6)])  # 1.6: line-to-line values, and a scale beside them
+@pytest.mark.parametrize("factor", [slowly(0.3), slowly(1.6)])  # 1.6: line-to-line values, and a scale beside them
 def test_a_scale_of_the_currents_may_be_one_of_the_constants(factor, tmp_path):
     """R, L_d and L_q, each by the same factor, leave the same voltages: only another instrument decides."""
     answer = answer_to(Mistake("", scaled(PHASES, factor)), tmp_path)

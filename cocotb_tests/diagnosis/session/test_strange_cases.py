@@ -27,7 +27,7 @@ from fluxproof.diagnosis.session import diagnose
         slowly(LAST, 10, {"phase_resistance_asymmetry"}),  # a ripple at a fifth of the order was taken for its cause
         # Without the saturation, held-out points beyond the fitted ones fitted better.
         slowly(LAST, 40, {"cross_saturation", "iron_loss", "saturation"}),
-        (FOURTH, 17, {"cogging", "delay"}),  # all pulses late: a sampling skew, or nothing
+        slowly(FOURTH, 17, {"cogging", "delay"}),  # all pulses late: a sampling skew, or nothing
         slowly(FOURTH, 7, {"current_scale", "delay", "resistance_temperature"}),  # the same
         slowly(FOURTH, 49, {"current_scale", "delay", "magnet_temperature"}),  # the same
         slowly(FIFTH, 22, set()),  # healthy: at one speed the codes beat with the sampling at order 9.5

@@ -118,7 +118,7 @@ class AxiDevice:
         duty_clocks = now() + 1 - began
         await RisingEdge(dut.core.values_valid)
         await FallingEdge(dut.aclk)
-        observed = {name: read(handle, signed) for name, handle, signed in self.observed}
+        observed = {name: 0 if handle is None else read(handle, signed) for name, handle, signed in self.observed}
         await writing
         await self.after_sample()
         return await self._finish(observed, duty_clocks, running)
