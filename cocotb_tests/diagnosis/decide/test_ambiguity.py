@@ -11,7 +11,7 @@ import pytest
 from cocotb_tests.support.drives import PAPER
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.decide.ambiguity import alternatives, ambiguities
-from fluxproof.diagnosis.decide.names import names_of
+from fluxproof.diagnosis.decide.names import _sized, names_of
 from fluxproof.diagnosis.ground.nominal import load_nominal
 
 
@@ -77,3 +77,9 @@ def test_groups_are_connected():
     """Of a or b, and b or c, any may stand for another; d, in all sets, is no alternative."""
     assert alternatives([frozenset(x) for x in ("ad", "bd", "cd")]) == [{"a", "b", "c"}]
     assert alternatives([frozenset(x) for x in ("d", "ad", "abd")]) == []
+
+
+def test_members_without_a_size_leave_an_alternative_and_not_its_statement():
+    """One of two inductances was there with certainty, and nothing was said, as the other had no size."""
+    assert _sized(("a", "b", "c"), {"a", "c"}) == ("a", "c")
+    assert _sized(("a", "b"), {"a"}) == ("a", "b") == _sized(("a", "b"), set())

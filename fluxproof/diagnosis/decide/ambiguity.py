@@ -12,10 +12,9 @@ from fluxproof.diagnosis.ground import constants as k
 def ambiguities(kept, present, sure, effects) -> tuple[tuple[str, ...], ...]:
     """Groups of which one effect is there; kept: [(probability, fit)] of the sets that hold the posterior's mass.
 
-    present: {effect: probability} of those that may be listed (names.py); sure: effects that are named, so that they
-    are no alternative.
+    present: {effect: probability}; sure: effects that are named, so that they are no alternative.
     """
-    rest = [(frozenset(fit.names) & present.keys()) - set(sure) for _, fit in kept]
+    rest = [frozenset(fit.names) - set(sure) for _, fit in kept]
     groups = [tuple(sorted(n for n in g if present[n] >= k.OPEN)) for g in alternatives(rest)]
     rules = (
         _has_rivals,

@@ -69,8 +69,8 @@ def names_of(posterior) -> Names:
     sure = {n: p for n, p in present.items() if p >= 1.0 - k.DOUBTED and n in best.names}
     named = {n: p for n, p in sure.items() if effects[n].named}
     suspects = _no_imitations({n: p for n, p in sure.items() if not effects[n].named}, best)
-    sized = {n: p for n, p in present.items() if _has_a_size(n, effects[n], kept)}
-    groups = tuple(_with_what_depends(g, named, kept) for g in ambiguities(kept, sized, sure, effects))
+    sized = {n for n in present if _has_a_size(n, effects[n], kept)}
+    groups = tuple(_with_what_depends(_sized(g, sized), named, kept) for g in ambiguities(kept, present, sure, effects))
     twins = [n for n in named if _has_a_twin(n, effects, groups)]
     if twins and not measures_torque(posterior.setup.view):  # which a wrong current changes, and a wrong nameplate not
         groups += tuple(_with_its_twin(n, effects[n], best.c[n]) for n in twins)
@@ -91,6 +91,12 @@ def _has_a_size(name, effect, kept) -> bool:
     fits = [fit for _, fit in kept if name in fit.names]
     nominal = fits[0].problem.view.nominal
     return any(has_size(estimates_in(fit, name), effect, fit.c[name], nominal) for fit in fits)
+
+
+def _sized(group, sized) -> tuple[str, ...]:
+    """The members of an alternative that have a size; all where fewer than two have: that one is there is known."""
+    mine = tuple(n for n in group if n in sized)
+    return mine if len(mine) > 1 else group
 
 
 def _no_imitations(suspects, fit) -> dict[str, float]:
