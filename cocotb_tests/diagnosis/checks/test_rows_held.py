@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
 from cocotb_tests.support.recordings.from_equations import T, codes, made, nominal_of, write
+from fluxproof.diagnosis.checks import limits_met
 from fluxproof.diagnosis.loading.load import load_recording
 
 
@@ -92,3 +95,10 @@ def test_several_rows_a_period_without_a_rhythm_are_refused(tmp_path, nominal):
         table[name] = np.interp(np.arange(32000), np.arange(0, 32000, 8), table[name][::8])
     recording = load_recording(write(tmp_path / "r.parquet", table), nominal)
     assert recording.fatal and "keep those at which the current was sampled" in recording.problems[0].message
+
+
+def test_a_largest_value_between_two_rows_far_apart_is_no_limit():
+    """The quantile is near none of the rows: the median of nothing was a warning on the user's terminal."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert limits_met._level(np.append(np.linspace(0.0, 1.0, 99), 100.0)) is None

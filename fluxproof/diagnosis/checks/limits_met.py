@@ -79,7 +79,10 @@ def _level(size) -> float | None:
     top = float(np.quantile(size, TOP))
     if top <= 0.0:
         return None
-    top = float(np.median(size[np.abs(size / top - 1.0) <= 2 * BAND]))
+    near = size[np.abs(size / top - 1.0) <= 2 * BAND]
+    if not len(near):  # the quantile lies between two rows that are far apart
+        return None
+    top = float(np.median(near))
     share = size / top - 1.0
     inside = np.count_nonzero(np.abs(share) <= BAND)
     beside = np.count_nonzero((share < -BAND) & (share >= -3 * BAND)) + np.count_nonzero(share > BAND)
