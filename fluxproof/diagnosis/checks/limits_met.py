@@ -69,7 +69,7 @@ def _planned(omega, size, top: float, at) -> bool:
     """Whether smaller values stay while the speed changes, too: then the plan asks for them, and for the largest."""
     moved, change = np.abs(omega[LEAST:] - omega[:-LEAST]), np.abs(size[LEAST:] - size[:-LEAST])
     free = (moved > FAST * moved.max()) & ~at[LEAST:] & ~at[:-LEAST] & (size[LEAST:] > SMALL * top)
-    return np.count_nonzero(free) >= LEAST and float(np.mean(change[free] <= BAND * top)) > MOST
+    return bool(np.count_nonzero(free) >= LEAST and np.mean(change[free] <= BAND * top) > MOST)
 
 
 def _level(size) -> float | None:
