@@ -72,7 +72,8 @@ def run(args: argparse.Namespace) -> int:
     bus = Watched(open_bus(args.bus, drive), page)
     status = commission_file(bus, args.drive, drive, reverse, folder, args.hold, page.tell)
     if status != STOPPED:
-        say("the page stays until Ctrl-C")
+        left_out = f"; {page.left_out} snapshots are missing in its curves" if page.left_out else ""
+        say(f"the page stays until Ctrl-C{left_out}")
         page.wait()
     return status
 

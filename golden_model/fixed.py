@@ -113,3 +113,10 @@ def wrap_s(x, width):
     """x modulo 2**width as a signed number: the shorter of the two differences of two angles."""
     half = 1 << (width - 1)
     return ((x + half) & ((1 << width) - 1)) - half
+
+
+@kernel
+def length(x, y):
+    """About the length of a vector: the larger size and half the smaller one; that of x < 0 is -1 - x."""
+    x, y = x if x >= 0 else -1 - x, y if y >= 0 else -1 - y
+    return max(x, y) + (min(x, y) >> 1)

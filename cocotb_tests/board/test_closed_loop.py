@@ -52,9 +52,9 @@ def in_ghdl(periods: int, run: str, folder: Path, compiled: bool = False) -> dic
 
 
 def test_closed_loop_in_ghdl(tmp_path):
-    """130 periods of 160 clocks: every register over the bus, enabled, the motor turns, the index is found."""
-    facts = in_ghdl(130, "standstill, short periods", tmp_path)
-    assert facts["clocks"] > 130 * 160 and facts["samples"] >= 80 and facts["rpm"] > 50
+    """136 periods of 160 clocks: every register over the bus, enabled, the motor turns, the index is found."""
+    facts = in_ghdl(136, "standstill, short periods", tmp_path)
+    assert facts["clocks"] > 136 * 160 and facts["samples"] >= 90 and facts["rpm"] > 50
     assert facts["encoder_flags"] & 1 and facts["index_count"] > 0 and facts["illegal_count"] == 0
     assert facts["board_flags"] == 1 << NAMES.index("no_index") and facts["snap_ready"] == 1, "told before the index"
 

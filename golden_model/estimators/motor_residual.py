@@ -37,9 +37,8 @@ from golden_model.control.dead_time_compensation import S_ALPHA, S_BETA
 from golden_model.estimators.flux_models import DROP_MODEL, MODEL
 from golden_model.estimators.v_dead_adaline import V_LEVEL
 from golden_model.estimators.winding_resistance import RHO, T_S
-from golden_model.fixed import Format, round_half_up, round_sat, saturate, saturate_u
+from golden_model.fixed import Format, length, round_half_up, round_sat, saturate, saturate_u
 from golden_model.formats import BIT, FLUX, FLUX_STATE, FLUX_STATE_W, FLUX_W, PU, PU_W, SAMPLE_TIME, TRIG, TRIG_ONE
-from golden_model.io.emf_check import length
 from golden_model.kernel import kernel
 
 RESIDUAL = Format(1, -3, 20)

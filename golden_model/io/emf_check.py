@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 from golden_model.block import Block, Port
 from golden_model.estimators.flux_models import DROP_MODEL, MODEL_FLUX, MODEL_MAX
-from golden_model.fixed import Format, saturate
+from golden_model.fixed import Format, length, saturate
 from golden_model.formats import BIT, FLUX, FLUX_W, PU, PU_W, RESISTANCE
 from golden_model.kernel import kernel
 
@@ -42,13 +42,6 @@ class State(NamedTuple):
     sum_d: int = 0  # 2**MEAN times the mean
     sum_q: int = 0
     count: int = 0
-
-
-@kernel
-def length(x, y):
-    """The larger size and half the smaller one."""
-    x, y = x if x >= 0 else -1 - x, y if y >= 0 else -1 - y
-    return max(x, y) + (min(x, y) >> 1)
 
 
 @kernel

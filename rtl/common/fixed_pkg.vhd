@@ -74,6 +74,15 @@ package fixed_pkg is
   -- x limited to [0, limit*2**shift], with one comparison.
   function within_u (x : signed; limit : unsigned; shift : natural) return unsigned;
 
+  -- x where it is not negative, else -1 - x: exact in the same width.
+  function size (x : signed) return signed;
+
+  -- 1 where the size of x is the smaller one.
+  function smaller_is (x : signed; y : signed) return std_logic;
+
+  -- About the length of a vector: the larger size and half the smaller one; less: that of x is the smaller one.
+  function length (x : signed; y : signed; less : std_logic) return signed;
+
 end package fixed_pkg;
 
 package body fixed_pkg is
@@ -229,12 +238,12 @@ package body fixed_pkg is
   function beyond (x : signed; limit : unsigned; shift : natural) return std_logic is
     constant PARTS : positive := maximum(1, (shift + 3) / 4);
     alias v        : signed(x'length - 1 downto 0) is x;
-    variable size  : unsigned(x'length - 2 - shift downto 0);
+    variable above : unsigned(x'length - 2 - shift downto 0);
     variable more  : unsigned(PARTS - 1 downto 0);
-    variable room  : signed(maximum(size'length, limit'length) + PARTS downto 0);
+    variable room  : signed(maximum(above'length, limit'length) + PARTS downto 0);
   begin
     -- The complement of a negative x is -x - 1: if it reaches the limit, -x is above the limit.
-    size := unsigned(v(v'high - 1 downto shift) xor v(v'high));
+    above := unsigned(v(v'high - 1 downto shift) xor v(v'high));
     -- The bits below the LSB of the limit, ORed in groups of four; the comparison's carry chain combines the groups.
     more := (others => '0');
     if shift > 0 then
@@ -244,7 +253,7 @@ package body fixed_pkg is
     end if;
     more(0) := more(0) or v(v'high);
     room    := signed(resize(limit & (PARTS - 1 downto 0 => '0'), room'length))
-               - signed(resize(size & more, room'length));
+               - signed(resize(above & more, room'length));
     return room(room'high);
   end function;
 
@@ -268,6 +277,30 @@ package body fixed_pkg is
       return shift_left(resize(limit, WIDTH), shift);
     end if;
     return resize(unsigned(x), WIDTH);
+  end function;
+
+  function size (x : signed) return signed is
+  begin
+    return x xor (x'range => x(x'high));
+  end function;
+
+  function smaller_is (x : signed; y : signed) return std_logic is
+  begin
+    if size(x) < size(y) then
+      return '1';
+    end if;
+    return '0';
+  end function;
+
+  function length (x : signed; y : signed; less : std_logic) return signed is
+    variable larger  : signed(x'length - 1 downto 0) := size(x);
+    variable smaller : signed(x'length - 1 downto 0) := size(y);
+  begin
+    if less = '1' then
+      larger  := size(y);
+      smaller := size(x);
+    end if;
+    return resize(larger, x'length + 1) + shift_right(resize(smaller, x'length + 1), 1);
   end function;
 
 end package body fixed_pkg;

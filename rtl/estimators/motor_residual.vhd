@@ -120,31 +120,6 @@ architecture rtl of motor_residual is
   signal most, sum_most, size_35   : limit_t;
   signal used, limited, moved      : std_logic;
 
-  function size (x : signed) return signed is
-  begin
-    return x xor (x'range => x(x'high));
-  end function;
-
-  function smaller_is (x : signed; y : signed) return std_logic is
-  begin
-    if size(x) < size(y) then
-      return '1';
-    end if;
-    return '0';
-  end function;
-
-  -- The larger size and half the smaller one; less: that of x is the smaller one
-  function length (x : signed; y : signed; less : std_logic) return signed is
-    variable larger  : signed(x'length - 1 downto 0) := size(x);
-    variable smaller : signed(x'length - 1 downto 0) := size(y);
-  begin
-    if less = '1' then
-      larger  := size(y);
-      smaller := size(x);
-    end if;
-    return resize(larger, x'length + 1) + shift_right(resize(smaller, x'length + 1), 1);
-  end function;
-
   -- Twice a product of sines
   function twice (x : signed) return signed is
   begin

@@ -66,36 +66,12 @@ architecture rtl of emf_check is
   signal size_10   : sum_t;
   signal over_11   : std_logic;
 
-  function size (x : signed) return signed is
-  begin
-    return x xor (x'range => x(x'high));
-  end function;
-
   -- 2*(i - mean), saturated
   function change (i : signed; sum : signed) return signed is
   begin
     return saturate(shift_left(resize(i, PU_W + 2) - shift_right(sum, EMF_CHECK_MEAN), 1), PU_W);
   end function;
 
-  function smaller_is (x : signed; y : signed) return std_logic is
-  begin
-    if size(x) < size(y) then
-      return '1';
-    end if;
-    return '0';
-  end function;
-
-  -- The larger size and half the smaller one; less: that of x is the smaller one
-  function length (x : signed; y : signed; less : std_logic) return signed is
-    variable larger  : signed(x'length - 1 downto 0) := size(x);
-    variable smaller : signed(x'length - 1 downto 0) := size(y);
-  begin
-    if less = '1' then
-      larger  := size(y);
-      smaller := size(x);
-    end if;
-    return resize(larger, x'length + 1) + shift_right(resize(smaller, x'length + 1), 1);
-  end function;
 begin
   valid(0) <= in_valid;
   prod_1   <= a_1 * b_1;
