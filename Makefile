@@ -23,6 +23,9 @@ export YOWASP_CACHE_DIR ?= $(CURDIR)/.cache/yowasp
 FLUXPROOF_RECORDINGS ?= ../shared/recordings
 export FLUXPROOF_RECORDINGS := $(if $(word 3,$(CURDIR) $(FLUXPROOF_RECORDINGS)),$(FLUXPROOF_RECORDINGS),$(abspath $(FLUXPROOF_RECORDINGS)))
 unexport PYTHONHOME
+# Where Python is told to keep no compiled files, each of a run's thousand processes compiles every library anew.
+unexport PYTHONDONTWRITEBYTECODE
+export PYTHONPYCACHEPREFIX ?= $(CURDIR)/.cache/pycache
 
 PYTHON_RUN := .venv/bin/python
 
