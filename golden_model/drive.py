@@ -26,7 +26,9 @@ from golden_model.supply import Supply
 
 @dataclass(frozen=True)
 class Machine:
-    """[machine]; names as in plant.Machine, so that ``plant.Machine.from_mapping(asdict(...))`` works."""
+    """[machine]: the motor and its load, as the core and `fluxproof simulate` know it."""
+
+    # Names as in plant.Machine, so that ``plant.Machine.from_mapping(asdict(...))`` works.
 
     pole_pairs: int = whole(1, 63, "pole pairs")
     resistance_ohm: float = positive("ohm", "per phase at temperature_ref_c")
@@ -37,7 +39,7 @@ class Machine:
     rated_speed_rad_s: float = positive("rad/s", "mechanical")
     inertia_kgm2: float = not_negative("kg m2", "rotor and load", 0.0)
     viscous_friction_nms: float = not_negative("Nm s", "per mechanical rad/s", 0.0)
-    coulomb_friction_nm: float = not_negative("Nm", "", 0.0)
+    coulomb_friction_nm: float = not_negative("Nm", "of the shaft, against its motion", 0.0)
     temperature_ref_c: float = real("degC", "of resistance and magnet flux", 20.0)
     temperature_winding_c: float = real("degC", "at the start of a simulation", 20.0)
     temperature_magnet_c: float = real("degC", "at the start of a simulation", 20.0)
@@ -51,18 +53,20 @@ class Machine:
 
 @dataclass(frozen=True)
 class Inverter:
-    """[inverter]; the drops and slopes serve simulation alone, named as in plant.Inverter."""
+    """[inverter]; thresholds, slopes and zero_current_a serve simulation alone."""
+
+    # Names as in plant.Inverter.
 
     dc_bus_v: float = positive("V", "nominal bus voltage")
     pwm_frequency_hz: float = positive("Hz", "one carrier up and down")
     dead_time_s: float = positive("s", "both gates of a leg off")
-    min_pulse_s: float | None = positive("s", "shortest pulse of a leg, dead time included", None)
+    min_pulse_s: float | None = positive("s", "of a leg, dead time included; this or min_on_time_s", None)
     v_switch_v: float = not_negative("V", "threshold of the switch", 0.0)
     v_diode_v: float = not_negative("V", "threshold of the diode", 0.0)
     r_switch_ohm: float = not_negative("ohm", "slope of the switch", 0.0)
     r_diode_ohm: float = not_negative("ohm", "slope of the diode", 0.0)
     zero_current_a: float = not_negative("A", "width of the zone around zero current", 0.0)
-    min_on_time_s: float | None = positive("s", "shortest time that a switch is on", None)
+    min_on_time_s: float | None = positive("s", "shortest time that a switch is on; this or min_pulse_s", None)
     bootstrap_charge_s: float = not_negative("s", "all lower switches on before the drive switches; 0: none", 0.0)
 
     @property
@@ -150,7 +154,7 @@ class Sampling:
 
 @dataclass(frozen=True)
 class Protection:
-    """[protection], all optional: what turns the gates off; defaults in scaling.py.
+    """[protection], all optional: what turns the gates off.
 
     A condition whose trip_ key is false is reported in the core's flags and does not trip.
     """
@@ -196,7 +200,7 @@ class Protection:
 
 @dataclass(frozen=True)
 class Core:
-    """[core]"""
+    """[core]: the clock, what is built in, and the levels of its pins."""
 
     clock_hz: float = positive("Hz", "of the core; a whole multiple of twice the PWM frequency")
     updates_per_period: int = whole(1, 2, "1: sampled and updated at the valley; 2: at the valley and the peak", 1)
@@ -212,11 +216,11 @@ class Core:
 
 @dataclass(frozen=True)
 class BaseChoice:
-    """[bases], all optional; see the module's docstring for the defaults."""
+    """[bases], all optional: the SI values of 1.0 per unit; docs/design.md has the ranges."""
 
-    current_a: float | None = positive("A", "per-unit base", None)
-    voltage_v: float | None = positive("V", "per-unit base", None)
-    omega_me_rad_s: float | None = positive("rad/s", "per-unit base, electrical", None)
+    current_a: float | None = positive("A", "per-unit base; current_range_a if none", None)
+    voltage_v: float | None = positive("V", "per-unit base; half of u_dc_range_v if none", None)
+    omega_me_rad_s: float | None = positive("rad/s", "per-unit base, electrical; at rated speed if none", None)
 
 
 @dataclass(frozen=True)
@@ -280,6 +284,11 @@ class Drive:
     def current_limit_a(self):
         limit = self.control.current_limit_a
         return self.machine.rated_current_a if limit is None else limit
+
+    @property
+    def working_current_a(self):
+        """The current that checks of the sensors go by: rated, or the drive's own limit where the motor is larger."""
+        return min(self.machine.rated_current_a, self.current_limit_a)
 
     @property
     def current_sensors(self):

@@ -77,6 +77,8 @@ def _pulses(drive):
     if i.min_on_time_s is not None and i.min_pulse_s is not None:
         raise DriveError("[inverter] min_on_time_s and min_pulse_s are both given: allowed is one of them")
     dead, pulse, half = i.dead_time_s, i.leg_pulse_s, 0.5 / i.pwm_frequency_hz
+    if not dead < half:
+        _refuse("[inverter] dead_time_s", dead, f"above 0 and below half a PWM period, {half:g} s")
     if not dead < pulse:
         _refuse("[inverter] dead_time_s", dead, f"above 0 and below min_pulse_s = {pulse:g} s")
     least = max(ON_OF_DEAD * dead, ON_S)
@@ -107,6 +109,10 @@ def _low_side(drive):
     needed_s = settle + drive.inverter.dead_time_s + max(-drive.sampling.delay_s, 0.0)
     least = 4.0 * needed_s / period
     least = max(least, 4.0 * drive.sampling.delay_s / period)  # and the switch is on until then
+    if not least < 1.0:
+        most = max(0.25 * period - needed_s + settle, 0.0)
+        why = f"a quarter of the PWM period, {period:g} s, lies before the sample at most, dead time included"
+        _refuse("[sensors] low_side_settle_s", settle, f"below {most:.4g} s: {why}")
     if not drive.control.voltage_reserve >= least * (1.0 - WHOLE):
         why = f"half of the low time, voltage_reserve / 4 of {period:g} s, lies before the sample"
         keys = f"[sensors] low_side_settle_s = {settle:g} and dead_time_s = {drive.inverter.dead_time_s:g}"

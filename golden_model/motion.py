@@ -13,6 +13,7 @@ from golden_model.control.position_control import POSITION
 from golden_model.control.position_plan import SECTION_BITS, WAY
 from golden_model.drive_keys import DriveError, not_negative, positive, real, whole
 from golden_model.formats import PU
+from golden_model.protection_limits import OVERSPEED
 from golden_model.scale_entry import Entry, base_keys
 from golden_model.units import TURN_RAD
 
@@ -46,6 +47,12 @@ def check_position(drive):
         raise DriveError(f"[position] {given} is given, {missing} is not: allowed is both or none")
     if p.stop_low_rad is not None and not p.stop_low_rad < p.stop_high_rad:
         raise DriveError(f"[position] stop_low_rad = {p.stop_low_rad:g} must be below stop_high_rad")
+    if not drive.core.position_loop and p != Position():
+        raise DriveError("[position] is given and [core] position_loop is not true: nothing would use it")
+    top = drive.protection.overspeed_rad_s or OVERSPEED * drive.machine.rated_speed_rad_s
+    if p.speed_rad_s is not None and not p.speed_rad_s < top:
+        allowed = f"below {top:g} rad/s, where the drive trips: [protection] overspeed_rad_s"
+        raise DriveError(f"[position] speed_rad_s = {p.speed_rad_s:g} is out of range: allowed is {allowed}")
     if drive.core.position_loop and drive.control.speed_bandwidth_hz is None and p.bandwidth_hz is None:
         raise DriveError("[core] position_loop needs [control] speed_bandwidth_hz or [position] bandwidth_hz")
 
@@ -76,7 +83,11 @@ def limits(drive):
     bits = max(0, math.ceil(math.log2(samples) - 1e-9) - SECTION_BITS)
     if bits > JERK_BITS_MOST:
         least = 2.0 * acceleration / (t_s * (1 << (SECTION_BITS + JERK_BITS_MOST)))
-        raise DriveError(f"[position] jerk_rad_s3 = {p.jerk_rad_s3:g} is out of range: allowed is {least:g} or more")
+        longest = 1 << (SECTION_BITS + JERK_BITS_MOST)
+        raise DriveError(
+            f"[position] jerk_rad_s3 = {p.jerk_rad_s3:g} is out of range: allowed is {least:g} or more, which takes "
+            f"{longest} samples, the most, to reach {acceleration:g} rad/s2; a lower acceleration_rad_s2 allows less"
+        )
     return speed, acceleration, bits
 
 

@@ -39,18 +39,19 @@ EMF_S, EMF_OF_LOOP, EMF_HALL_S, EMF_SECTORS = 2.8e-3, 1.4, 0.05, 1.0
 # the rated current; the angle that a mean covers
 RESIDUAL_OF_RATED, RESIDUAL_OF_LEG, RESIDUAL_OF_R, RESIDUAL_OF_PSI, RESIDUAL_OF_LI = 0.002, 0.07, 0.06, 0.021, 0.015
 SUM_OF_RESIDUAL, SUM_OF_CURRENT, LIGHT, SECTOR = 0.004, 0.001, 0.1, math.pi / 3.0
+WORKING = "[machine] rated_current_a; [control] current_limit_a"
 ALWAYS_REPORTED = ("trip", "early")  # the pin always trips, a rejected sample never does
 
 
 def protection(drive):
     """Trip levels and ignored faults: see golden_model/io."""
-    p, s, b, m = drive.protection, drive.sensors, drive.bases, drive.machine
+    p, s, b = drive.protection, drive.sensors, drive.bases
     amperes, volts = base_keys(drive, "current_a"), base_keys(drive, "voltage_v")
     limit, bus = drive.current_limit_a, drive.inverter.dc_bus_v
     keys = "[machine] rated_current_a" if drive.control.current_limit_a is None else "[control] current_limit_a"
     most = max(limit, min(TRIP_OF_LIMIT * limit, TRIP_OF_RANGE * s.current_range_a))
     yield _limit("i_trip", p.current_trip_a, most, "A", b.current_a, "current_trip_a", keys, amperes)
-    keys, most = "[machine] rated_current_a", SUM_OF_RATED * m.rated_current_a
+    keys, most = WORKING, SUM_OF_RATED * drive.working_current_a
     yield _limit("sum_trip", p.current_sum_trip_a, most, "A", b.current_a, "current_sum_trip_a", keys, amperes)
     yield Entry("rail_samples", p.rail_samples, "1", 1.0, "[protection] rail_samples")
     keys = "[inverter] dc_bus_v"
@@ -120,12 +121,12 @@ def residual_limits(drive):
     ohm = RESIDUAL_OF_R * (m.resistance_ohm + max(i.r_switch_ohm, i.r_diode_ohm))
     keys = f"[machine] resistance_ohm; [inverter] r_switch_ohm, r_diode_ohm; {sample}"
     yield _fitting("residual_i", ohm * t_s, "H", b.flux_wb / b.current_a, f.OF_I, keys)
-    keys = "[machine] rated_current_a"
-    yield Entry("residual_light", LIGHT * m.rated_current_a, "A", b.current_a, keys)
+    keys = WORKING
+    yield Entry("residual_light", LIGHT * drive.working_current_a, "A", b.current_a, keys)
     slow, speed = SECTOR / (2**f.MEAN * t_s), base_keys(drive, "omega_me_rad_s")
     most = PU.hi * PU.lsb * b.omega_me_rad_s
     yield Entry("residual_slow", min(slow, most), "rad/s", b.omega_me_rad_s, f"{sample}; {speed}")
-    yield _fitting("residual_sum_max", SUM_OF_RESIDUAL * m.rated_current_a, "A", b.current_a, f.SUM_LEAST, keys)
+    yield _fitting("residual_sum_max", SUM_OF_RESIDUAL * drive.working_current_a, "A", b.current_a, f.SUM_LEAST, keys)
     yield Entry("residual_sum_i", SUM_OF_CURRENT, "1", 1.0, "none: a share of the current")
     lasts = min(p.residual_s, f.SAMPLES.hi * t_s)
     yield Entry("residual_samples", lasts, "s", t_s, f"[protection] residual_s; {sample}")
@@ -153,13 +154,13 @@ def motion_limits(drive):
     sample = "[inverter] pwm_frequency_hz"
     yield Entry("runaway_samples", p.runaway_s, "s", t_s, f"[protection] runaway_s; {sample}")
     yield Entry("stall_samples", p.stall_s, "s", t_s, f"[protection] stall_s; {sample}")
-    keys = "[machine] rated_current_a"
-    least = OPEN_OF_RATED * m.rated_current_a
+    keys = WORKING
+    least = OPEN_OF_RATED * drive.working_current_a
     yield _limit("i_open", p.open_load_a, least, "A", b.current_a, "open_load_a", keys, amperes)
     most, key = p.current_offset_a, "[protection] current_offset_a"
     if most is None:
         step = OFFSET.lsb * b.current_a
-        most, key = min(max(OFFSET_OF_RATED * m.rated_current_a, step), OFFSET.hi * step), keys
+        most, key = min(max(OFFSET_OF_RATED * drive.working_current_a, step), OFFSET.hi * step), keys
     yield Entry("offset_max", most, "A", b.current_a, f"{key}; {amperes}")
     yield Entry("heartbeat", p.heartbeat_s, "s", t_s, f"[protection] heartbeat_s; {sample}")
 

@@ -19,7 +19,7 @@ from golden_model.io import register_map
 from golden_model.motor import motor_model
 from golden_model.records import RECORDS, vhdl_type
 from golden_model.registry import BLOCKS
-from scripts import generate_telemetry
+from scripts import generate_drive_keys, generate_telemetry
 
 PACKAGE = Path(__file__).resolve().parent.parent / "rtl" / "generated" / "fluxproof_pkg.vhd"
 
@@ -116,6 +116,7 @@ def outputs() -> dict[Path, str]:
         PACKAGE: render(),
         generate_telemetry.ENTITY: generate_telemetry.render(),
         generate_telemetry.DOCUMENT: generate_telemetry.document(),
+        generate_drive_keys.DOCUMENT: generate_drive_keys.document(),
         **generated.files(),
     }
 

@@ -87,6 +87,7 @@ WRONG = {  # section, line, what the message must contain besides the file's nam
     "slow clock": ("core", "clock_hz = 1e5", "[core] clock_hz", "8 to 32767"),
     "tiny pwm": ("core", "clock_hz = 1e12", "[core] clock_hz", "8 to 32767"),
     "dead time": ("inverter", "dead_time_s = 3e-6", "[inverter] dead_time_s", "below min_pulse_s = 3e-06 s"),
+    "dead time in us": ("inverter", "dead_time_s = 300", "[inverter] dead_time_s = 300", "half a PWM period, 5e-05 s"),
     "no dead time": ("inverter", "dead_time_s = 0", "[inverter] dead_time_s = 0", "1e-12 up to 1000000 s"),
     "switch's pulse": (
         "inverter",
@@ -101,6 +102,12 @@ WRONG = {  # section, line, what the message must contain besides the file's nam
         "[control] voltage_reserve = 0 is out of range: allowed is at least 0.16",
         "low_side_settle_s = 2e-06 and dead_time_s = 2e-06",
         "before the sample",
+    ),
+    "shunt too slow": (
+        "sensors",
+        "low_side_settle_s = 24e-6",
+        "[sensors] low_side_settle_s = 2.4e-05 is out of range: allowed is below 2.3e-05 s",
+        "a quarter of the PWM period",
     ),
     "min pulse": ("inverter", "min_pulse_s = 60e-6", "[inverter] min_pulse_s", "5e-05 s"),
     "bus": ("inverter", "dc_bus_v = 900", "[inverter] dc_bus_v = 900", "sqrt(3)", "866.025 V"),
@@ -346,3 +353,13 @@ def test_shunts_in_the_lower_legs_have_a_reserve_and_one_update():
         described(0.159)
     with pytest.raises(DriveError, match="no lower switch is on at the peak"):
         described(0.5, updates_per_period=2)
+
+
+def test_a_motor_larger_than_the_drive_does_not_loosen_its_checks():
+    """Limits of the sensors go by the current that the drive works with: a rated current of ten times is no excuse."""
+    drive = load(PAPER)
+    large = dataclasses.replace(drive, machine=dataclasses.replace(drive.machine, rated_current_a=52.3))
+    assert large.working_current_a == drive.working_current_a == 5.23
+    named = ("sum_trip", "i_open", "offset_max", "residual_light", "residual_sum_max")
+    given, kept = (registers(d).values._asdict() for d in (large, drive))
+    assert [given[name] for name in named] == [kept[name] for name in named]

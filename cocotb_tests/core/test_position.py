@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from golden_model.control import position_trajectory as trajectory
 from golden_model.control.position_control import POSITION
 from golden_model.control.position_plan import WAY
 from golden_model.drive_keys import DriveError
+from golden_model.motion import Position
 from golden_model.registers import registers
 from studies.position import figures
 from studies.position.drives import all_modes, moves, positioned
@@ -73,11 +76,15 @@ def test_without_position_mode_every_bit_is_as_before():
     assert one["shaft_position"].any() and not other["shaft_position"].any()
 
 
-def test_a_stop_beyond_the_other_is_refused():
+def test_moves_that_cannot_be_are_refused():
     with pytest.raises(DriveError, match="stop_low_rad"):
         positioned("paper001", stop_low_rad=1.0, stop_high_rad=-1.0)
     with pytest.raises(DriveError, match="stop_high_rad is not"):
         positioned("paper001", stop_low_rad=1.0)
+    with pytest.raises(DriveError, match="position_loop is not true"):
+        dataclasses.replace(drives.load(DRIVES / "paper001.toml"), position=Position(bandwidth_hz=5.0))
+    with pytest.raises(DriveError, match=r"speed_rad_s = 400 .* below 376.8 rad/s, where the drive trips"):
+        positioned("servo_24v", speed_rad_s=400.0)
     with pytest.raises(DriveError, match="jerk_rad_s3"):
         registers(positioned("paper001", jerk_rad_s3=1.0))
     assert not any(registers(drives.load(DRIVES / "paper001.toml")).values.k_inertia for _ in (0,))

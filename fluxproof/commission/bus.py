@@ -76,8 +76,10 @@ class UioBus:
                 self._memory = mmap.mmap(handle, WINDOW)
             finally:
                 os.close(handle)
-        except (OSError, ValueError) as error:
-            raise DriveError(f"{path}: cannot be mapped: {getattr(error, 'strerror', None) or error}") from None
+        except ValueError:
+            raise DriveError(f"{path}: is not the {WINDOW} bytes of a core's registers: allowed is /dev/uioN") from None
+        except OSError as error:
+            raise DriveError(f"{path}: cannot be mapped: {error.strerror or error}") from None
         self._words = np.frombuffer(self._memory, np.uint32)
         self._signed = np.frombuffer(self._memory, np.int32)
         if (found := self.read("identification")) != IDENTIFICATION:
