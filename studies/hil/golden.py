@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Core and motor as models in one compiled loop, clock by clock: what `fluxproof_hil` does, its samples kept.
+"""Core and motor as models in one compiled loop, clock by clock: what `core_and_motor` does, its samples kept.
 
 The same sequence as closed_loop.golden_run, which a test compares: a sample is taken at the trigger, CONVERSION clocks
 later the core gets its codes; the motor makes a step every STEP clocks.  The shaft is held at a speed for each period.
