@@ -8,8 +8,8 @@ import re
 
 import pytest
 
-from cocotb_tests.core.test_bring_up import compiled
 from cocotb_tests.support.drives import PAPER
+from cocotb_tests.support.host.bring_up import compiled
 from cocotb_tests.support.host.hil_board import HilBoard
 from cocotb_tests.support.needs import skip_without_ghdl5
 from fluxproof.checkout import ROOT
