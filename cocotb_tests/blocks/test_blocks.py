@@ -24,7 +24,8 @@ IDS = [f"{b.name}-{k}" for b, k in CASES]
 WITHOUT_MODEL = {"fluxproof", "protection"}  # only instantiate; the closed loop compares them
 WITHOUT_MODEL |= {"axi_lite_slave", "register_access", "register_file"}  # one twin for a transfer: test_registers_axi
 WITHOUT_MODEL |= {"board_register_file", "fluxproof_board"}  # the same with a board's registers: test_closed_loop
-WITHOUT_MODEL |= {"motor_model", "motor_map", "motor_waves", "fluxproof_hil"}  # wiring: test_motor_model
+WITHOUT_MODEL |= {"motor_model", "motor_map", "motor_waves", "core_and_motor", "motor_bench"}  # test_motor_model
+WITHOUT_MODEL |= {"hil_register_file", "fluxproof_hil"}  # wiring: test_hil_top
 WITHOUT_MODEL |= {"fluxproof_axi", "power_stage"}  # instantiates; has no clock: test_axi_top, test_power_stage
 
 

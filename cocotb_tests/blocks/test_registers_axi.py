@@ -24,7 +24,7 @@ from golden_model.drive import load
 from golden_model.fixed import Format
 from golden_model.fluxproof import REGISTERS
 from golden_model.generated.register_names import ADDRESSES
-from golden_model.io import board_map, register_map
+from golden_model.io import motor_map, register_map
 from golden_model.io.register_file import RegisterFile, from_word, to_word
 from golden_model.io.register_map import DECERR, OKAY, SLVERR, Kind
 from scripts import generate
@@ -33,7 +33,7 @@ from scripts.registers.compiled import compile_file, words
 
 MAP = register_map.registers()
 BESIDE_THE_CORE = ("telemetry", "irq_", "ring_")  # names of registers that the core does not see
-WHOLE = board_map.registers()  # with the second block of addresses, that of a board
+WHOLE = motor_map.registers()  # with the further blocks of addresses, of a board and of a motor
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def test_generated_files_are_fresh(monkeypatch, tmp_path, capsys):
     """Each committed file matches the current map; a stale one is named."""
     for path, text in generated.files().items():
         assert path.read_text() == text, f"{path.name} is stale: run `make generate` and commit it"
-    for name in ("RDL", "MAP_PACKAGE", "REGISTER_FILE", "BOARD_FILE", "C_HEADER", "NAMES"):
+    for name in ("RDL", "MAP_PACKAGE", "REGISTER_FILE", "BOARD_FILE", "HIL_FILE", "C_HEADER", "NAMES"):
         path = getattr(generated, name)
         stale = tmp_path / path.name
         stale.write_text(path.read_text() + "\n")

@@ -9,25 +9,22 @@ import re
 import shutil
 import signal
 import subprocess
-from pathlib import Path
 
 import pytest
 
 from cocotb_tests.support.drives import PAPER
+from cocotb_tests.support.host.bring_up import SOFTWARE, compiled
 from cocotb_tests.support.host.golden_board import GoldenBoard
 from cocotb_tests.support.host.rtl_board import RtlBoard
 from cocotb_tests.support.slow import slowly
 from fluxproof.checkout import DRIVES, ROOT
 from fluxproof.cosim import verilog
-from fluxproof.print_registers import c_lines
 from golden_model import drive as drives
-from golden_model.board_registers import board_generics, board_set
+from golden_model.board_registers import board_generics
 from golden_model.io import board_map
 from golden_model.io.fault_latch import NAMES
 from scripts.registers.rdl import version_word
 
-SOFTWARE = ROOT / "docs" / "software"
-STRICT = ("-std=c11", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic")
 RPM = 30 / math.pi
 
 
@@ -35,30 +32,6 @@ RPM = 30 / math.pi
 def drive():
     """The paper's drive with fewer clocks per period: the same machine and registers, faster."""
     return drives.with_carrier(drives.load(PAPER), 100)
-
-
-def compiled(folder: Path, drive, bus: Path) -> Path:
-    """bring_up.c for ``drive`` with the functions of ``bus``."""
-    compiler = shutil.which("gcc") or shutil.which("cc")
-    if compiler is None:
-        pytest.skip("there is no C compiler here")
-    header = "\n".join(c_lines(str(PAPER), drive, board_set(drive))) + "\n"
-    (folder / "drive_registers.h").write_text(header)
-    program = folder / f"bring_up_{bus.stem}"
-    includes = [f"-I{folder}", f"-I{SOFTWARE}"]
-    command = [
-        compiler,
-        *STRICT,
-        *includes,
-        str(SOFTWARE / "bring_up.c"),
-        str(bus),
-        "-o",
-        str(program),
-        "-lm",
-    ]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return program
 
 
 @pytest.fixture(scope="module")

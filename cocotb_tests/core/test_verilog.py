@@ -136,5 +136,5 @@ def test_sources_are_in_compile_order(tmp_path):
     (tmp_path / "z_pkg.vhd").write_text("package p is end package;")
     assert [path.stem for path in rtl_sources(tmp_path)] == ["z_pkg", "b", "a"]
     order = [path.stem for path in rtl_sources()]
-    tops = {"fluxproof_axi", "fluxproof_board", "fluxproof_hil"}
-    assert set(order[-3:]) == tops and order.index("fluxproof") < len(order) - 3
+    tops = {"fluxproof_axi", "fluxproof_board", "fluxproof_hil", "core_and_motor"}
+    assert set(order[-4:]) == tops and order.index("fluxproof") < len(order) - 4

@@ -15,7 +15,7 @@ from fluxproof.checkout import ROOT, RTL
 from fluxproof.cosim.entity import read_entity
 from fluxproof.cosim.sources import rtl_sources
 from scripts.package import __main__ as package_command
-from scripts.package import axi_top, board_top, ipxact, packaged
+from scripts.package import axi_top, board_top, hil_top, ipxact, packaged
 from scripts.registers import vhdl
 from scripts.registers.compiled import compile_file, words
 
@@ -62,7 +62,7 @@ def test_top_reports_unconnected_ports(tmp_path):
         axi_top.render(tmp_path / "rtl")
 
 
-@pytest.mark.parametrize("top", [axi_top.AXI, board_top.BOARD], ids=lambda top: top.name)
+@pytest.mark.parametrize("top", [axi_top.AXI, board_top.BOARD, hil_top.HIL], ids=lambda top: top.name)
 def test_top_is_vhdl_93(tmp_path, top):
     """A block design takes no VHDL-2008 top as a module; what it instantiates is empty here, ports as they are."""
     package = (RTL / "generated" / "fluxproof_pkg.vhd").read_text()

@@ -14,10 +14,13 @@ from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.vivado.tclsh import stubbed
 from fluxproof.checkout import DRIVES, ROOT
 from fluxproof.command import main
+from fluxproof.cosim.entity import read_entity
+from fluxproof.hil.registers import motor_scale
+from fluxproof.plant import Machine
 from fluxproof.project import need
 from golden_model.drive import load
 from golden_model.registers import registers
-from scripts.package import axi_top
+from scripts.package import axi_top, hil_top
 
 ZYNQ, ARTIX, ULTRASCALE = "xc7z020clg484-1", "xc7a100tcsg324-1", "xczu3eg-sbva484-1-e"
 
@@ -111,6 +114,40 @@ def test_script_builds_the_core_alone(facts, tmp_path, part):  # noqa: F811
     assert f"-part {part}" in done.stdout and "CLOCK_HZ=100000000" in done.stdout
     assert re.search(r"^create_clock .*-period 10\.000", done.stdout, re.MULTILINE)
     assert ("fluxproof.dtsi" in files) == (part == ULTRASCALE)
+
+
+def test_motor_in_the_fpga_needs_no_pins(facts, tmp_path):  # noqa: F811
+    """The block design has the top with the motor, nothing leaves the chip; load_motor.c compiles with its words."""
+    folder, files, drive = made(tmp_path, "drive", ZYNQ, "--hil", clock_hz="100e6")
+    done = stubbed(facts, folder / "project.tcl")
+    assert done.returncode == 0, done.stderr
+    assert re.search(r"^create_bd_cell .*-reference fluxproof_hil.* drive$", done.stdout, re.MULTILINE)
+    assert "CONFIG.ENCODER 0" in done.stdout and "make_bd_pins_external" not in done.stdout
+    for name in read_entity(hil_top.HIL.path).generics:
+        assert re.search(rf"^  constant {name} +: natural := \d+;", files["drive_pkg.vhd"], re.MULTILINE), name
+    assert f"{{0x83C, {round(drive.machine.magnet_flux_wb / flux_base(drive) * 2**23)}}}" in files["motor_registers.h"]
+    folder, _, _ = made(tmp_path, "artix", ARTIX, "--hil")
+    done = stubbed(facts, folder / "project.tcl")
+    assert done.returncode == 0 and "-top fluxproof_hil" in done.stdout, done.stderr
+    compiler = shutil.which("cc") or pytest.skip("there is no C compiler here")
+    software = ROOT / "docs" / "software"
+    command = [compiler, "-Wall", "-Wextra", "-Werror", "-I", software, "-I", folder, software / "load_motor.c"]
+    done = subprocess.run([*command, software / "bus_uio.c", "-o", tmp_path / "load"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_motor_that_cannot_be_in_the_fpga_is_told(tmp_path, capsys):
+    path = tmp_path / "drive.toml"
+    path.write_text(PAPER.read_text() + '\n[encoder]\nkind = "biss"\nbits = 18\nclock_hz = 5e6\npause_s = 12e-6\n')
+    assert main(["project", str(path), "--hil", "--part", ZYNQ, "--out", str(tmp_path / "out")]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and not (tmp_path / "out").exists()
+    assert f'{path}: [encoder] kind = "biss": the motor in the FPGA has code, abz, hall' in err
+
+
+def flux_base(drive) -> float:
+    machine = Machine.from_mapping(vars(drive.machine))
+    return motor_scale(machine, drive.inverter.dc_bus_v, drive.sensors.current_range_a, drive.core.clock_hz).flux_wb
 
 
 def test_device_tree_of_both_families(tmp_path):

@@ -48,7 +48,7 @@ def test_compiled_loop_is_the_clocked_one():
     asked = np.array([[*closed_loop.references(of).values(), 0]] * periods, np.int64)
     u_dc = of.scale.u_dc(of.drive.inverter.dc_bus_v)
     hil = golden.Hil(of.core.values, of.core.config, of.motor, of.tables, of.sensors, u_dc)
-    _, observed = golden.record(hil, asked, np.full(periods, speed, np.int64))
+    _, observed = golden.record(hil, asked, golden.constant(of.motor, periods))
     for k, row in enumerate(clocked):
         assert row == {name: int(values[k]) for name, values in observed.items()}, f"sample {k}"
     assert len(clocked) == periods - 1 and abs(clocked[-1]["omega_me"]) > 1000

@@ -1637,6 +1637,279 @@ extern "C" {
 #define FLUXPROOF__LIMIT_LOW__VALUE_bw 16
 #define FLUXPROOF__LIMIT_LOW__VALUE_reset 0x0
 
+// reg - fluxproof::motor_u_dc
+#define FLUXPROOF__MOTOR_U_DC__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_U_DC__VALUE_bp 0
+#define FLUXPROOF__MOTOR_U_DC__VALUE_bw 32
+#define FLUXPROOF__MOTOR_U_DC__VALUE_reset 0x0
+
+// reg - fluxproof::motor_load
+#define FLUXPROOF__MOTOR_LOAD__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_LOAD__VALUE_bp 0
+#define FLUXPROOF__MOTOR_LOAD__VALUE_bw 32
+#define FLUXPROOF__MOTOR_LOAD__VALUE_reset 0x0
+
+// reg - fluxproof::motor_start
+#define FLUXPROOF__MOTOR_START__VALUE_bm 0x1
+#define FLUXPROOF__MOTOR_START__VALUE_bp 0
+#define FLUXPROOF__MOTOR_START__VALUE_bw 1
+#define FLUXPROOF__MOTOR_START__VALUE_reset 0x0
+
+// reg - fluxproof::motor_hold
+#define FLUXPROOF__MOTOR_HOLD__VALUE_bm 0x1
+#define FLUXPROOF__MOTOR_HOLD__VALUE_bp 0
+#define FLUXPROOF__MOTOR_HOLD__VALUE_bw 1
+#define FLUXPROOF__MOTOR_HOLD__VALUE_reset 0x0
+
+// reg - fluxproof::motor_omega_set
+#define FLUXPROOF__MOTOR_OMEGA_SET__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_OMEGA_SET__VALUE_bp 0
+#define FLUXPROOF__MOTOR_OMEGA_SET__VALUE_bw 32
+#define FLUXPROOF__MOTOR_OMEGA_SET__VALUE_reset 0x0
+
+// reg - fluxproof::motor_clear_faults
+#define FLUXPROOF__MOTOR_CLEAR_FAULTS__VALUE_bm 0x1
+#define FLUXPROOF__MOTOR_CLEAR_FAULTS__VALUE_bp 0
+#define FLUXPROOF__MOTOR_CLEAR_FAULTS__VALUE_bw 1
+#define FLUXPROOF__MOTOR_CLEAR_FAULTS__VALUE_reset 0x0
+
+// reg - fluxproof::motor_stiffness
+#define FLUXPROOF__MOTOR_STIFFNESS__VALUE_bm 0x1ffff
+#define FLUXPROOF__MOTOR_STIFFNESS__VALUE_bp 0
+#define FLUXPROOF__MOTOR_STIFFNESS__VALUE_bw 17
+#define FLUXPROOF__MOTOR_STIFFNESS__VALUE_reset 0x0
+
+// reg - fluxproof::motor_v_switch
+#define FLUXPROOF__MOTOR_V_SWITCH__VALUE_bm 0x3fffff
+#define FLUXPROOF__MOTOR_V_SWITCH__VALUE_bp 0
+#define FLUXPROOF__MOTOR_V_SWITCH__VALUE_bw 22
+#define FLUXPROOF__MOTOR_V_SWITCH__VALUE_reset 0x0
+
+// reg - fluxproof::motor_v_diode
+#define FLUXPROOF__MOTOR_V_DIODE__VALUE_bm 0x3fffff
+#define FLUXPROOF__MOTOR_V_DIODE__VALUE_bp 0
+#define FLUXPROOF__MOTOR_V_DIODE__VALUE_bw 22
+#define FLUXPROOF__MOTOR_V_DIODE__VALUE_reset 0x0
+
+// reg - fluxproof::motor_r_a
+#define FLUXPROOF__MOTOR_R_A__VALUE_bm 0xffffff
+#define FLUXPROOF__MOTOR_R_A__VALUE_bp 0
+#define FLUXPROOF__MOTOR_R_A__VALUE_bw 24
+#define FLUXPROOF__MOTOR_R_A__VALUE_reset 0x0
+
+// reg - fluxproof::motor_r_b
+#define FLUXPROOF__MOTOR_R_B__VALUE_bm 0xffffff
+#define FLUXPROOF__MOTOR_R_B__VALUE_bp 0
+#define FLUXPROOF__MOTOR_R_B__VALUE_bw 24
+#define FLUXPROOF__MOTOR_R_B__VALUE_reset 0x0
+
+// reg - fluxproof::motor_r_c
+#define FLUXPROOF__MOTOR_R_C__VALUE_bm 0xffffff
+#define FLUXPROOF__MOTOR_R_C__VALUE_bp 0
+#define FLUXPROOF__MOTOR_R_C__VALUE_bw 24
+#define FLUXPROOF__MOTOR_R_C__VALUE_reset 0x0
+
+// reg - fluxproof::motor_psi_start
+#define FLUXPROOF__MOTOR_PSI_START__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_PSI_START__VALUE_bp 0
+#define FLUXPROOF__MOTOR_PSI_START__VALUE_bw 32
+#define FLUXPROOF__MOTOR_PSI_START__VALUE_reset 0x0
+
+// reg - fluxproof::motor_psi_m
+#define FLUXPROOF__MOTOR_PSI_M__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_PSI_M__VALUE_bp 0
+#define FLUXPROOF__MOTOR_PSI_M__VALUE_bw 32
+#define FLUXPROOF__MOTOR_PSI_M__VALUE_reset 0x0
+
+// reg - fluxproof::motor_inv_l_d
+#define FLUXPROOF__MOTOR_INV_L_D__VALUE_bm 0x1ffffff
+#define FLUXPROOF__MOTOR_INV_L_D__VALUE_bp 0
+#define FLUXPROOF__MOTOR_INV_L_D__VALUE_bw 25
+#define FLUXPROOF__MOTOR_INV_L_D__VALUE_reset 0x0
+
+// reg - fluxproof::motor_inv_l_q
+#define FLUXPROOF__MOTOR_INV_L_Q__VALUE_bm 0x1ffffff
+#define FLUXPROOF__MOTOR_INV_L_Q__VALUE_bp 0
+#define FLUXPROOF__MOTOR_INV_L_Q__VALUE_bw 25
+#define FLUXPROOF__MOTOR_INV_L_Q__VALUE_reset 0x0
+
+// reg - fluxproof::motor_pole_pairs
+#define FLUXPROOF__MOTOR_POLE_PAIRS__VALUE_bm 0x1f
+#define FLUXPROOF__MOTOR_POLE_PAIRS__VALUE_bp 0
+#define FLUXPROOF__MOTOR_POLE_PAIRS__VALUE_bw 5
+#define FLUXPROOF__MOTOR_POLE_PAIRS__VALUE_reset 0x0
+
+// reg - fluxproof::motor_k_j
+#define FLUXPROOF__MOTOR_K_J__VALUE_bm 0x1ffffff
+#define FLUXPROOF__MOTOR_K_J__VALUE_bp 0
+#define FLUXPROOF__MOTOR_K_J__VALUE_bw 25
+#define FLUXPROOF__MOTOR_K_J__VALUE_reset 0x0
+
+// reg - fluxproof::motor_viscous
+#define FLUXPROOF__MOTOR_VISCOUS__VALUE_bm 0x1ffff
+#define FLUXPROOF__MOTOR_VISCOUS__VALUE_bp 0
+#define FLUXPROOF__MOTOR_VISCOUS__VALUE_bw 17
+#define FLUXPROOF__MOTOR_VISCOUS__VALUE_reset 0x0
+
+// reg - fluxproof::motor_coulomb
+#define FLUXPROOF__MOTOR_COULOMB__VALUE_bm 0x7fffff
+#define FLUXPROOF__MOTOR_COULOMB__VALUE_bp 0
+#define FLUXPROOF__MOTOR_COULOMB__VALUE_bw 23
+#define FLUXPROOF__MOTOR_COULOMB__VALUE_reset 0x0
+
+// reg - fluxproof::motor_scale_a
+#define FLUXPROOF__MOTOR_SCALE_A__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_SCALE_A__VALUE_bp 0
+#define FLUXPROOF__MOTOR_SCALE_A__VALUE_bw 32
+#define FLUXPROOF__MOTOR_SCALE_A__VALUE_reset 0x0
+
+// reg - fluxproof::motor_scale_b
+#define FLUXPROOF__MOTOR_SCALE_B__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_SCALE_B__VALUE_bp 0
+#define FLUXPROOF__MOTOR_SCALE_B__VALUE_bw 32
+#define FLUXPROOF__MOTOR_SCALE_B__VALUE_reset 0x0
+
+// reg - fluxproof::motor_scale_c
+#define FLUXPROOF__MOTOR_SCALE_C__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_SCALE_C__VALUE_bp 0
+#define FLUXPROOF__MOTOR_SCALE_C__VALUE_bw 32
+#define FLUXPROOF__MOTOR_SCALE_C__VALUE_reset 0x0
+
+// reg - fluxproof::motor_scale_u
+#define FLUXPROOF__MOTOR_SCALE_U__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_SCALE_U__VALUE_bp 0
+#define FLUXPROOF__MOTOR_SCALE_U__VALUE_bw 32
+#define FLUXPROOF__MOTOR_SCALE_U__VALUE_reset 0x0
+
+// reg - fluxproof::motor_zero_a
+#define FLUXPROOF__MOTOR_ZERO_A__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_ZERO_A__VALUE_bp 0
+#define FLUXPROOF__MOTOR_ZERO_A__VALUE_bw 32
+#define FLUXPROOF__MOTOR_ZERO_A__VALUE_reset 0x0
+
+// reg - fluxproof::motor_zero_b
+#define FLUXPROOF__MOTOR_ZERO_B__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_ZERO_B__VALUE_bp 0
+#define FLUXPROOF__MOTOR_ZERO_B__VALUE_bw 32
+#define FLUXPROOF__MOTOR_ZERO_B__VALUE_reset 0x0
+
+// reg - fluxproof::motor_zero_c
+#define FLUXPROOF__MOTOR_ZERO_C__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_ZERO_C__VALUE_bp 0
+#define FLUXPROOF__MOTOR_ZERO_C__VALUE_bw 32
+#define FLUXPROOF__MOTOR_ZERO_C__VALUE_reset 0x0
+
+// reg - fluxproof::motor_zero_u
+#define FLUXPROOF__MOTOR_ZERO_U__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_ZERO_U__VALUE_bp 0
+#define FLUXPROOF__MOTOR_ZERO_U__VALUE_bw 32
+#define FLUXPROOF__MOTOR_ZERO_U__VALUE_reset 0x0
+
+// reg - fluxproof::motor_noise_i
+#define FLUXPROOF__MOTOR_NOISE_I__VALUE_bm 0xff
+#define FLUXPROOF__MOTOR_NOISE_I__VALUE_bp 0
+#define FLUXPROOF__MOTOR_NOISE_I__VALUE_bw 8
+#define FLUXPROOF__MOTOR_NOISE_I__VALUE_reset 0x0
+
+// reg - fluxproof::motor_noise_u
+#define FLUXPROOF__MOTOR_NOISE_U__VALUE_bm 0xff
+#define FLUXPROOF__MOTOR_NOISE_U__VALUE_bp 0
+#define FLUXPROOF__MOTOR_NOISE_U__VALUE_bw 8
+#define FLUXPROOF__MOTOR_NOISE_U__VALUE_reset 0x0
+
+// reg - fluxproof::motor_angle_offset
+#define FLUXPROOF__MOTOR_ANGLE_OFFSET__VALUE_bm 0x1ffffff
+#define FLUXPROOF__MOTOR_ANGLE_OFFSET__VALUE_bp 0
+#define FLUXPROOF__MOTOR_ANGLE_OFFSET__VALUE_bw 25
+#define FLUXPROOF__MOTOR_ANGLE_OFFSET__VALUE_reset 0x0
+
+// reg - fluxproof::motor_counts
+#define FLUXPROOF__MOTOR_COUNTS__VALUE_bm 0xffff
+#define FLUXPROOF__MOTOR_COUNTS__VALUE_bp 0
+#define FLUXPROOF__MOTOR_COUNTS__VALUE_bw 16
+#define FLUXPROOF__MOTOR_COUNTS__VALUE_reset 0x0
+
+// reg - fluxproof::motor_hall_offset
+#define FLUXPROOF__MOTOR_HALL_OFFSET__VALUE_bm 0x1ffffff
+#define FLUXPROOF__MOTOR_HALL_OFFSET__VALUE_bp 0
+#define FLUXPROOF__MOTOR_HALL_OFFSET__VALUE_bw 25
+#define FLUXPROOF__MOTOR_HALL_OFFSET__VALUE_reset 0x0
+
+// reg - fluxproof::motor_table_select
+#define FLUXPROOF__MOTOR_TABLE_SELECT__VALUE_bm 0x3
+#define FLUXPROOF__MOTOR_TABLE_SELECT__VALUE_bp 0
+#define FLUXPROOF__MOTOR_TABLE_SELECT__VALUE_bw 2
+#define FLUXPROOF__MOTOR_TABLE_SELECT__VALUE_reset 0x0
+
+// reg - fluxproof::motor_table_at
+#define FLUXPROOF__MOTOR_TABLE_AT__VALUE_bm 0xfff
+#define FLUXPROOF__MOTOR_TABLE_AT__VALUE_bp 0
+#define FLUXPROOF__MOTOR_TABLE_AT__VALUE_bw 12
+#define FLUXPROOF__MOTOR_TABLE_AT__VALUE_reset 0x0
+
+// reg - fluxproof::motor_table_high
+#define FLUXPROOF__MOTOR_TABLE_HIGH__VALUE_bm 0x3ffff
+#define FLUXPROOF__MOTOR_TABLE_HIGH__VALUE_bp 0
+#define FLUXPROOF__MOTOR_TABLE_HIGH__VALUE_bw 18
+#define FLUXPROOF__MOTOR_TABLE_HIGH__VALUE_reset 0x0
+
+// reg - fluxproof::motor_table_low
+#define FLUXPROOF__MOTOR_TABLE_LOW__VALUE_bm 0x3ffff
+#define FLUXPROOF__MOTOR_TABLE_LOW__VALUE_bp 0
+#define FLUXPROOF__MOTOR_TABLE_LOW__VALUE_bw 18
+#define FLUXPROOF__MOTOR_TABLE_LOW__VALUE_reset 0x0
+
+// reg - fluxproof::motor_table_write
+#define FLUXPROOF__MOTOR_TABLE_WRITE__VALUE_bm 0x1
+#define FLUXPROOF__MOTOR_TABLE_WRITE__VALUE_bp 0
+#define FLUXPROOF__MOTOR_TABLE_WRITE__VALUE_bw 1
+#define FLUXPROOF__MOTOR_TABLE_WRITE__VALUE_reset 0x0
+
+// reg - fluxproof::motor_i_a
+#define FLUXPROOF__MOTOR_I_A__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_I_A__VALUE_bp 0
+#define FLUXPROOF__MOTOR_I_A__VALUE_bw 32
+
+// reg - fluxproof::motor_i_b
+#define FLUXPROOF__MOTOR_I_B__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_I_B__VALUE_bp 0
+#define FLUXPROOF__MOTOR_I_B__VALUE_bw 32
+
+// reg - fluxproof::motor_i_c
+#define FLUXPROOF__MOTOR_I_C__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_I_C__VALUE_bp 0
+#define FLUXPROOF__MOTOR_I_C__VALUE_bw 32
+
+// reg - fluxproof::motor_torque
+#define FLUXPROOF__MOTOR_TORQUE__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_TORQUE__VALUE_bp 0
+#define FLUXPROOF__MOTOR_TORQUE__VALUE_bw 32
+
+// reg - fluxproof::motor_omega_m
+#define FLUXPROOF__MOTOR_OMEGA_M__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_OMEGA_M__VALUE_bp 0
+#define FLUXPROOF__MOTOR_OMEGA_M__VALUE_bw 32
+
+// reg - fluxproof::motor_theta_m
+#define FLUXPROOF__MOTOR_THETA_M__VALUE_bm 0x1ffffff
+#define FLUXPROOF__MOTOR_THETA_M__VALUE_bp 0
+#define FLUXPROOF__MOTOR_THETA_M__VALUE_bw 25
+
+// reg - fluxproof::motor_theta_e
+#define FLUXPROOF__MOTOR_THETA_E__VALUE_bm 0x1ffffff
+#define FLUXPROOF__MOTOR_THETA_E__VALUE_bp 0
+#define FLUXPROOF__MOTOR_THETA_E__VALUE_bw 25
+
+// reg - fluxproof::motor_shoot_through
+#define FLUXPROOF__MOTOR_SHOOT_THROUGH__VALUE_bm 0x1
+#define FLUXPROOF__MOTOR_SHOOT_THROUGH__VALUE_bp 0
+#define FLUXPROOF__MOTOR_SHOOT_THROUGH__VALUE_bw 1
+
+// reg - fluxproof::motor_ready
+#define FLUXPROOF__MOTOR_READY__VALUE_bm 0x1
+#define FLUXPROOF__MOTOR_READY__VALUE_bp 0
+#define FLUXPROOF__MOTOR_READY__VALUE_bw 1
+
 // addrmap - fluxproof
 typedef struct {
     uint32_t identification;
@@ -1928,11 +2201,64 @@ typedef struct {
     uint32_t trip_oversampling;
     uint32_t limit_high;
     uint32_t limit_low;
+    uint8_t RESERVED_5dc_7ff[0x224];
+    uint32_t motor_u_dc;
+    uint32_t motor_load;
+    uint32_t motor_start;
+    uint32_t motor_hold;
+    uint32_t motor_omega_set;
+    uint32_t motor_clear_faults;
+    uint8_t RESERVED_818_81f[0x8];
+    uint32_t motor_stiffness;
+    uint32_t motor_v_switch;
+    uint32_t motor_v_diode;
+    uint32_t motor_r_a;
+    uint32_t motor_r_b;
+    uint32_t motor_r_c;
+    uint32_t motor_psi_start;
+    uint32_t motor_psi_m;
+    uint32_t motor_inv_l_d;
+    uint32_t motor_inv_l_q;
+    uint32_t motor_pole_pairs;
+    uint8_t RESERVED_84c_84f[0x4];
+    uint32_t motor_k_j;
+    uint32_t motor_viscous;
+    uint32_t motor_coulomb;
+    uint8_t RESERVED_85c_87f[0x24];
+    uint32_t motor_scale_a;
+    uint32_t motor_scale_b;
+    uint32_t motor_scale_c;
+    uint32_t motor_scale_u;
+    uint32_t motor_zero_a;
+    uint32_t motor_zero_b;
+    uint32_t motor_zero_c;
+    uint32_t motor_zero_u;
+    uint32_t motor_noise_i;
+    uint32_t motor_noise_u;
+    uint32_t motor_angle_offset;
+    uint32_t motor_counts;
+    uint32_t motor_hall_offset;
+    uint8_t RESERVED_8b4_8bf[0xc];
+    uint32_t motor_table_select;
+    uint32_t motor_table_at;
+    uint32_t motor_table_high;
+    uint32_t motor_table_low;
+    uint32_t motor_table_write;
+    uint8_t RESERVED_8d4_8ff[0x2c];
+    uint32_t motor_i_a;
+    uint32_t motor_i_b;
+    uint32_t motor_i_c;
+    uint32_t motor_torque;
+    uint32_t motor_omega_m;
+    uint32_t motor_theta_m;
+    uint32_t motor_theta_e;
+    uint32_t motor_shoot_through;
+    uint32_t motor_ready;
 } fluxproof_t;
 
 
 #if defined(__cplusplus) || __STDC_VERSION__ >= 201112L
-static_assert(sizeof(fluxproof_t) == 0x5dc, "Packing error");
+static_assert(sizeof(fluxproof_t) == 0x924, "Packing error");
 #endif
 
 #ifdef __cplusplus

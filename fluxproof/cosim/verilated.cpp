@@ -3,9 +3,9 @@
 //
 // One source for every set of generics: cosim/verilator.py writes ports.inc with a line
 //     PORT(name, width, is_signed)
-// for each port of the top, and defines CORE_CLOCK, the name of its clock, CORE_HAS_GATES where it has gates and samples
-// (a single block has neither), and CORE_SHOWS_VALIDS where it has duty_valid and values_valid.  Functions name a port
-// by its line number, from 0.
+// for each port of the top, and defines CORE_CLOCK, the name of its clock, CORE_HAS_GATES where it has gates,
+// CORE_TAKES_SAMPLES where a sample comes from outside (a single block has neither), and CORE_SHOWS_VALIDS where it has
+// duty_valid and values_valid.  Functions name a port by its line number, from 0.
 //
 // A tick is one rising edge of the clock: inputs set before it are seen by it, outputs read after it are what the
 // registers hold from this edge on.
@@ -163,7 +163,9 @@ int64_t core_run_period(Core* core, int64_t most, int64_t sample_at, int32_t* cl
     facts[1] = facts[2] = facts[3] = 0;
     while (k < most) {
         ++k;
+#ifdef CORE_TAKES_SAMPLES
         top.sample_valid = k == sample_at;
+#endif
 #ifdef CORE_SHOWS_VALIDS
         if (k == sample_at) facts[3] = top.running;
 #endif
@@ -175,7 +177,9 @@ int64_t core_run_period(Core* core, int64_t most, int64_t sample_at, int32_t* cl
 #endif
         if (top.sample_trigger) break;
     }
+#ifdef CORE_TAKES_SAMPLES
     top.sample_valid = 0;
+#endif
     facts[0] = found;
     return k;
 #endif

@@ -13,7 +13,7 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 
@@ -77,12 +77,14 @@ def locked(path: Path) -> Iterator[None]:
         yield
 
 
-def _defines(names: Iterable[str]) -> list[str]:
+def _defines(ports: Collection[VerilogPort]) -> list[str]:
     """What verilated.cpp must know of a top with these ports."""
-    valids = ["-DCORE_SHOWS_VALIDS"] if {"duty_valid", "values_valid"} <= set(names) else []
-    gates = ["-DCORE_HAS_GATES"] if {"gate_high", "gate_low", "sample_valid", "sample_trigger"} <= set(names) else []
-    trip = ["-DCORE_HAS_ASYNC"] if {"trip", "aresetn"} <= set(names) else []  # io/power_stage
-    return [f"-DCORE_CLOCK={clock_of(names)}", *valids, *gates, *trip]
+    names = {port.name for port in ports}
+    valids = ["-DCORE_SHOWS_VALIDS"] if {"duty_valid", "values_valid"} <= names else []
+    gates = ["-DCORE_HAS_GATES"] if {"gate_high", "gate_low", "sample_trigger"} <= names else []
+    samples = ["-DCORE_TAKES_SAMPLES"] if "sample_valid" in {port.name for port in ports if port.is_input} else []
+    trip = ["-DCORE_HAS_ASYNC"] if {"trip", "aresetn"} <= names else []  # io/power_stage
+    return [f"-DCORE_CLOCK={clock_of(names)}", *valids, *gates, *samples, *trip]
 
 
 def clock_of(names: Iterable[str]) -> str:
@@ -93,7 +95,7 @@ def clock_of(names: Iterable[str]) -> str:
 def compile_library(
     folder: Path,
     top: str,
-    ports: Iterable[VerilogPort],
+    ports: Collection[VerilogPort],
     wrapper: Path = WRAPPER,
     hot: str = HOT,
     options: Iterable[str] = (),
@@ -104,7 +106,7 @@ def compile_library(
     """
     verilator, _, root = find_verilator()
     compiler = _compiler()
-    defines = _defines([p.name for p in ports])
+    defines = _defines(ports)
     (folder / "ports.inc").write_text("".join(f"PORT({p.name}, {p.width}, {int(p.signed)})\n" for p in ports))
     names = ["--Mdir", "obj", "--prefix", "Vcore", "--top-module", top, f"{top}.v"]
     _run([verilator, *VERILATOR_FLAGS, *options, *names], folder)

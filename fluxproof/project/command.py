@@ -11,7 +11,7 @@ from pathlib import Path
 from fluxproof.checkout import ROOT
 from fluxproof.diagnosis.whole_drive import load_drive
 from fluxproof.files import refuse_overwriting, write_text
-from fluxproof.project import need, parts, render
+from fluxproof.project import hil, need, parts, render
 from fluxproof.quote import say, shown
 from fluxproof.stage import together
 from golden_model.board_registers import board_set, has_board
@@ -26,13 +26,16 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--part", required=True, help="the FPGA by its full name, e.g. xc7z020clg484-1")
     parser.add_argument("--out", metavar="DIR", required=True, help="folder of the files")
     parser.add_argument("--base", metavar="ADDRESS", help="address of the registers; default that of the family")
+    parser.add_argument("--hil", action="store_true", help="with a motor in the FPGA, that of the drive file: no pins")
     parser.add_argument("--core", metavar="DIR", help="checkout of Fluxproof; can be given to the script as well")
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the files; an error in the drive or an argument writes nothing."""
-    drive = load_drive(args.drive)
+    drive, motor = load_drive(args.drive), {}
     try:
+        if args.hil:
+            drive, motor = hil.drive_of(drive), {hil.NAME: hil.header(args.drive, drive)}
         register_set = board_set(drive)
     except DriveError as error:
         raise DriveError(f"{args.drive}: {error}") from None
@@ -45,19 +48,20 @@ def run(args: argparse.Namespace) -> int:
     if abs(clock / round(clock) - 1.0) > 1e-12:
         raise DriveError(f"{args.drive}: [core] clock_hz = {clock!r}: allowed is a whole number of Hz")
     base = address(args.base) if args.base else processor.base if processor else 0
-    found = render.files(args.drive, drive, register_set, part, processor, base, core_folder(args.core))
+    project = render.Project(args.drive, drive, register_set, part, base, core_folder(args.core), args.hil)
+    found = render.files(project, processor) | motor
     folder = Path(args.out)
     refuse_overwriting([folder / name for name in found], [args.drive])
-    with together(folder, render.NAMES) as stage:
+    with together(folder, (*render.NAMES, hil.NAME)) as stage:
         for name, text in found.items():
             write_text(stage / name, text)
     for name in found:
         say(str(folder / name))
-    fits, words = need.judged(drive, part)
+    fits, words = need.judged(drive, part, args.hil)
     say(words if fits else f"fluxproof: {args.drive}: {words}", sys.stdout if fits else sys.stderr)
     if processor is None:
         say(f"no device tree: {part} has no processor; the script builds the core alone")
-    elif has_board(drive):
+    elif has_board(drive) and not args.hil:
         say("the script builds fluxproof_board alone: its pins are those of your board")
     elif processor is not parts.ZYNQ:
         say(f"the script builds the core alone: the block design around it is for {parts.ZYNQ.name}")

@@ -35,6 +35,7 @@ ENCODERS = {
 }  # fmt: skip
 CONVERTERS = {"codes": Cells(0, 0), "spi": Cells(442, 0), "xadc": Cells(156, 0), "delta_sigma": Cells(1133, 4)}
 BOARD = Cells(114 + 3 + 42 + 3 + 1510, 0)  # what else a board has, its registers for the core's
+MOTOR = Cells(3348, 28)  # motor_bench without its registers: docs/hil.md
 
 # Device of the vendor's tables: LUT, DSP48
 DEVICES = {
@@ -64,24 +65,26 @@ def device_of(part: str) -> str | None:
     return name if name in DEVICES else None
 
 
-def need(drive: Drive, estimators: bool) -> Cells:
-    """What the drive takes of a 7 series device, about."""
+def need(drive: Drive, estimators: bool, hil: bool = False) -> Cells:
+    """What the drive takes of a 7 series device, about; hil: with a motor in the FPGA."""
     cells = WHOLE if estimators else PLAIN + REGISTERS
-    if has_board(drive):
+    if hil:
+        cells = cells + MOTOR
+    if has_board(drive) or hil:
         cells = cells + ENCODERS[drive.encoder.kind] + CONVERTERS[drive.converters.kind] + BOARD
     return cells
 
 
-def judged(drive: Drive, part: str) -> tuple[bool, str]:
+def judged(drive: Drive, part: str, hil: bool = False) -> tuple[bool, str]:
     """(whether it fits, in words): True where the part is not in the table."""
-    needed, device = need(drive, drive.core.estimators), device_of(part)
+    needed, device = need(drive, drive.core.estimators, hil), device_of(part)
     if device is None:
         return True, f"needs about {needed}; what {part} has is not known here"
     has = DEVICES[device]
     if needed.fit(has):
         return True, f"needs about {needed}; {device} has {has}"
     said = f"needs about {needed}, {device} has {has}: it does not fit"
-    without = need(drive, False)
+    without = need(drive, False, hil)
     if drive.core.estimators and without.fit(has):
         return False, f"{said}; [core] estimators = false needs {without}"
     larger = next(name for name in DEVICES if name[:4] == device[:4] and needed.fit(DEVICES[name]))

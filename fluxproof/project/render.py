@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import NamedTuple
 
 from fluxproof.print_registers import c_lines
 from fluxproof.project.parts import ZYNQ, Processor, processor_of
@@ -18,17 +19,33 @@ NAMES = ("fluxproof_clock.xdc", "drive_pkg.vhd", "project.tcl", "drive_registers
 WINDOW = 0x1000  # bytes of the registers' address range
 
 
-def generics(drive: Drive, register_set: RegisterSet) -> dict[str, int]:
+class Project(NamedTuple):
+    """What the files are written from; ``hil``: with a motor in the FPGA."""
+
+    path: str
+    drive: Drive
+    register_set: RegisterSet
+    part: str
+    base: int
+    core: str
+    hil: bool
+
+    @property
+    def name(self) -> str:
+        return Path(self.path).name
+
+
+def generics(drive: Drive, register_set: RegisterSet, hil: bool = False) -> dict[str, int]:
     """The generics of the top, by their names in the VHDL."""
-    chosen = board_generics(drive) if has_board(drive) else {}
+    chosen = board_generics(drive) if has_board(drive) or hil else {}
     levels = {name: getattr(drive.core, name) for name in ("ring_rows", "gate_active", "trip_active", "brake_active")}
     named = register_set.config._asdict() | levels | chosen
     return {"CLOCK_HZ": round(drive.core.clock_hz), **{name.upper(): value for name, value in named.items()}}
 
 
-def top(drive: Drive) -> str:
-    """fluxproof_board where the drive file describes front ends, else fluxproof_axi."""
-    return "fluxproof_board" if has_board(drive) else "fluxproof_axi"
+def top(drive: Drive, hil: bool = False) -> str:
+    """fluxproof_board where the drive file describes front ends, else fluxproof_axi; fluxproof_hil with a motor."""
+    return "fluxproof_hil" if hil else "fluxproof_board" if has_board(drive) else "fluxproof_axi"
 
 
 def clock_period_ns(drive: Drive) -> float:
@@ -45,39 +62,45 @@ def clock_xdc(name: str, drive: Drive) -> str:
     )
 
 
-def vhdl_package(name: str, drive: Drive, register_set: RegisterSet) -> str:
+def vhdl_package(project: Project) -> str:
     """The generics as constants, for an instance by hand."""
-    values = generics(drive, register_set)
+    values = generics(project.drive, project.register_set, project.hil)
     wide = max(map(len, values))
     lines = [f"  constant {key:{wide}} : natural := {value};" for key, value in values.items()]
-    use = f"-- Generics of {top(drive)}: generic map (CLOCK_HZ => drive_pkg.CLOCK_HZ, ...)"
-    head = [vhdl_comment(f"{name} {BY}."), use, ""]
+    use = f"-- Generics of {top(project.drive, project.hil)}: generic map (CLOCK_HZ => drive_pkg.CLOCK_HZ, ...)"
+    head = [vhdl_comment(f"{project.name} {BY}."), use, ""]
     return "\n".join([*head, "package drive_pkg is", *lines, "end package drive_pkg;"]) + "\n"
 
 
-def tcl(name: str, drive: Drive, register_set: RegisterSet, part: str, base: int, core: str) -> str:
-    """The script for Vivado: a block design around the core on a Zynq-7000, the core or the board's top alone else."""
-    values = generics(drive, register_set)
-    whole = processor_of(part) is ZYNQ and not has_board(drive)
+def tcl(project: Project) -> str:
+    """The script for Vivado: a block design around the core on a Zynq-7000, the core or the board's top alone else.
+
+    A motor in the FPGA needs no pins, so that the front ends of a board do not keep it out of the block design.
+    """
+    drive, hil = project.drive, project.hil
+    values = generics(drive, project.register_set, hil)
+    whole = processor_of(project.part) is ZYNQ and (hil or not has_board(drive))
     head = [
-        tcl_comment(f"{name} {BY}."),
+        tcl_comment(f"{project.name} {BY}."),
         "#",
         "#   vivado -mode batch -source project.tcl [-tclargs CORE_DIR]",
         "#",
         "# CORE_DIR: the folder of a checkout of Fluxproof.",
         "",
         "set here [file dirname [file normalize [info script]]]",
-        f"set core {tcl_word(core)}",
+        f"set core {tcl_word(project.core)}",
         "if {$argc > 0} {",
         "  set core [file normalize [lindex $argv 0]]",
         "}",
         "if {![file exists [file join $core scripts vivado example.tcl]]} {",
         '  error "$core is no checkout of Fluxproof: give its folder with -tclargs"',
         "}",
-        f"set part {part}",
+        f"set part {project.part}",
+        f"set hil {int(hil)}",
         *(f"set {key.lower()} {value}" for key, value in values.items()),
     ]
-    return "\n".join([*head, *(_system(base) if whole else _alone(values, top(drive)))]) + "\n"
+    rest = _system(project.base) if whole else _alone(values, top(drive, hil))
+    return "\n".join([*head, *rest]) + "\n"
 
 
 def _system(base: int) -> list[str]:
@@ -145,16 +168,14 @@ def device_tree(name: str, drive: Drive, processor: Processor, base: int) -> str
 """
 
 
-def files(
-    path: str, drive: Drive, register_set: RegisterSet, part: str, processor: Processor | None, base: int, core: str
-) -> dict[str, str]:
+def files(project: Project, processor: Processor | None) -> dict[str, str]:
     """{file name: text} of the whole project."""
-    name = Path(path).name
+    name, drive = project.name, project.drive
     texts = [
         clock_xdc(name, drive),
-        vhdl_package(name, drive, register_set),
-        tcl(name, drive, register_set, part, base, core),
-        c_header(path, drive, register_set),
-        *([device_tree(name, drive, processor, base)] if processor is not None else []),
+        vhdl_package(project),
+        tcl(project),
+        c_header(project.path, drive, project.register_set),
+        *([device_tree(name, drive, processor, project.base)] if processor is not None else []),
     ]
     return dict(zip(NAMES, texts, strict=False))

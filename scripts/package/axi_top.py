@@ -3,7 +3,7 @@
 
 Ports of the same name are connected; RENAMED lists the exceptions.  A port without a driver is an error.  A register
 or status value added to the core needs no edit here.  A ``Top`` holds what is particular; board_top.py has that
-of a board.
+of a board, hil_top.py that of a motor in the FPGA.
 """
 
 from __future__ import annotations
@@ -142,7 +142,7 @@ class Top:
 
 
 AXI = Top(TOP, HEADER, INSTANCES, RENAMED, GENERICS, PINS, LINES, LINES_READ, LINES_DRIVE)
-BOARD_NAME = "fluxproof_board"  # the other top, see board_top.py
+BOARD_NAME, HIL_NAME = "fluxproof_board", "fluxproof_hil"  # the other tops, see board_top.py and hil_top.py
 
 
 def instances(rtl: Path = RTL, top: Top = AXI) -> dict[str, Entity]:
@@ -151,9 +151,10 @@ def instances(rtl: Path = RTL, top: Top = AXI) -> dict[str, Entity]:
 
 
 def source_names(rtl: Path = RTL) -> list[str]:
-    """The VHDL files in compile order with this top at the end, relative to the repository's root."""
-    others = rtl_sources(rtl, without=(PATH.name, f"{BOARD_NAME}.vhd"))
-    tops = (rtl / "generated" / f"{name}.vhd" for name in (BOARD_NAME, TOP))
+    """The VHDL files in compile order with the tops at the end, relative to the repository's root."""
+    names = (HIL_NAME, BOARD_NAME, TOP)
+    others = rtl_sources(rtl, without=[f"{name}.vhd" for name in names])
+    tops = (rtl / "generated" / f"{name}.vhd" for name in names)
     return [path.relative_to(rtl.parent).as_posix() for path in (*others, *tops)]
 
 

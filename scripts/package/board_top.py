@@ -24,7 +24,7 @@ HEADER = """\
 -- The file keeps to VHDL-93 so that a block design can also take it as a module."""
 
 # Of fluxproof_axi's pins: what the front ends give here
-_INSIDE = ("sample_valid", "adc_a", "adc_b", "adc_c", "adc_u_dc", "position_code")
+INSIDE = ("sample_valid", "adc_a", "adc_b", "adc_c", "adc_u_dc", "position_code")
 CODE, POSITION = axi_top.CODE, axi_top.POSITION
 _FRONT = (
     ("pin_a", "in", None, "incremental encoder"),
@@ -61,7 +61,7 @@ _FRONT = (
 
 def _pins():
     """The pins in the order of the entity: the front ends' take the place of the codes."""
-    before = [pin for pin in axi_top.PINS if pin[0] not in _INSIDE]
+    before = [pin for pin in axi_top.PINS if pin[0] not in INSIDE]
     at = next(k for k, pin in enumerate(before) if pin[0] == "sample_trigger")
     return (*before[: at + 1], *_FRONT, *before[at + 1 :])
 

@@ -6,11 +6,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from fluxproof.checkout import RTL
-from scripts.package import axi_top, board_top, fusesoc_core, ipxact, xgui
+from scripts.package import axi_top, board_top, fusesoc_core, hil_top, ipxact, xgui
 
 
 def files(rtl: Path = RTL) -> dict[Path, str]:
-    """{path: text}: both tops and their descriptions for Vivado and FuseSoC.
+    """{path: text}: the tops and their descriptions for Vivado and FuseSoC.
 
     ``rtl`` contains the entities of the top.  The top itself need not exist yet.
     """
@@ -18,6 +18,7 @@ def files(rtl: Path = RTL) -> dict[Path, str]:
     return {
         axi_top.PATH: top,
         board_top.BOARD.path: axi_top.render(rtl, board_top.BOARD),
+        hil_top.HIL.path: axi_top.render(rtl, hil_top.HIL),
         ipxact.PATH: ipxact.render(top, rtl),
         xgui.PATH: xgui.render(top),
         fusesoc_core.PATH: fusesoc_core.render(rtl),

@@ -5,14 +5,26 @@ from __future__ import annotations
 
 from fluxproof.checkout import RTL
 from fluxproof.cosim.flat import FLAT
-from scripts.prove import buses, cells, converters, core, current, encoders, gates, narrowing, pipeline, protection
+from scripts.prove import (
+    buses,
+    cells,
+    converters,
+    core,
+    current,
+    encoders,
+    gates,
+    narrowing,
+    pipeline,
+    protection,
+    residual,
+)
 from scripts.prove.proof import Proof
 
 
 def every_proof() -> tuple[Proof, ...]:
     """The whole catalogue."""
     written = (*gates.PROOFS, *core.PROOFS, *protection.PROOFS, *buses.PROOFS, *converters.PROOFS, *encoders.PROOFS)
-    written += (*cells.PROOFS, *current.PROOFS)
+    written += (*cells.PROOFS, *current.PROOFS, *residual.PROOFS)
     return (*written, *narrowing.proofs(), *pipeline.proofs())
 
 

@@ -46,6 +46,7 @@ class Proof:
     search_depth: int = 20
     covers: bool = True
     cut: Callable[[str], tuple[str, ...]] | None = None  # modules of the Verilog whose outputs become free
+    free: tuple[str, ...] = ()  # signals of the entity that take any value at any clock, such as a product
     patience: int = 0  # additional seconds that this proof needs
     vhdl: Callable[[], str] | None = None  # a generated entity around the RTL under proof
 

@@ -87,8 +87,16 @@ def convert(proof: Proof, generics: Mapping[str, int], rtl: Path, scratch: Path)
     return synthesize(sources, proof.entity, generics)
 
 
-def job(method: str, depth: int, macros: tuple[str, ...], limit: int, cut: tuple[str, ...] = ()) -> str:
+def job(
+    method: str,
+    depth: int,
+    macros: tuple[str, ...],
+    limit: int,
+    cut: tuple[str, ...] = (),
+    free: tuple[str, ...] = (),
+) -> str:
     """The file that sby reads."""
+    freed_signals = "".join(f"cutpoint formal_top/w:dut.{name}\n" for name in free)
     defines = " ".join(f"-D{macro}" for macro in macros)
     freed = f"blackbox {' '.join(cut)}\ncutpoint -blackbox\n" if cut else ""
     return f"""\
@@ -107,7 +115,7 @@ read_verilog dut.v
 read_verilog -sv -formal {defines} harness.sv
 hierarchy -top formal_top
 {freed}prep -flatten -top formal_top
-opt_clean -purge
+{freed_signals}opt_clean -purge
 
 [files]
 dut.v
@@ -139,7 +147,9 @@ def ask(
         macros += ("LEMMAS",)
     write_text(folder / "dut.v", verilog)
     write_text(folder / "harness.sv", proof.harness(verilog))
-    write_text(folder / "job.sby", job(method, depth, macros, limit, proof.cut(verilog) if proof.cut else ()))
+    write_text(
+        folder / "job.sby", job(method, depth, macros, limit, proof.cut(verilog) if proof.cut else (), proof.free)
+    )
     began = time.monotonic()
     said = run_sby(folder, limit)
     seconds = time.monotonic() - began

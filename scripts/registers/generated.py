@@ -15,6 +15,7 @@ from scripts.registers.compiled import compile_file, words
 RDL = ROOT / "rtl" / "generated" / "fluxproof.rdl"
 MAP_PACKAGE = ROOT / "rtl" / "generated" / "register_map_pkg.vhd"
 BOARD_FILE = ROOT / "rtl" / "generated" / "board_register_file.vhd"
+HIL_FILE = ROOT / "rtl" / "generated" / "hil_register_file.vhd"
 REGISTER_FILE = ROOT / "rtl" / "generated" / "register_file.vhd"
 C_HEADER = ROOT / "docs" / "software" / "fluxproof_registers.h"
 NAMES = ROOT / "golden_model" / "generated" / "register_names.py"
@@ -37,7 +38,8 @@ def files() -> dict[Path, str]:
         RDL: text,
         MAP_PACKAGE: vhdl.package(found),
         REGISTER_FILE: vhdl.register_file(vhdl.of_core(found)),
-        BOARD_FILE: vhdl.register_file(found, "board_register_file"),
+        BOARD_FILE: vhdl.register_file(vhdl.of_board(found), "board_register_file"),
+        HIL_FILE: vhdl.register_file(found, "hil_register_file"),
         C_HEADER: export.c_header(top, C_HEADER.name),
         NAMES: export.python_names(found),
     }

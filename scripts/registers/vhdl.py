@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The VHDL of the register map, from the compiled SystemRDL alone: register_map_pkg.vhd and both register files."""
+"""The VHDL of the register map, from the compiled SystemRDL alone: register_map_pkg.vhd and the register files."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import jinja2
 
-from golden_model.io import board_map
+from golden_model.io import board_map, motor_map
 from golden_model.records import RECORDS
 from scripts.registers.compiled import Part, Word
 
@@ -137,6 +137,11 @@ def of_core(words: list[Word]) -> list[Word]:
     return [word for word in words if word.address < board_map.BASE]
 
 
+def of_board(words: list[Word]) -> list[Word]:
+    """The registers of core and board: those below the motor's block of addresses."""
+    return [word for word in words if word.address < motor_map.BASE]
+
+
 def limit_bits(words: list[Word]) -> int:
     """Bits of a signed number that holds every range of the registers."""
     ends = [end for word in words if writable(word) for end in (word.parts[0].low, word.parts[0].high)]
@@ -144,7 +149,7 @@ def limit_bits(words: list[Word]) -> int:
 
 
 def register_file(words: list[Word], name: str = "register_file") -> str:
-    """rtl/generated/register_file.vhd, or that of a board: the same with the second block of addresses."""
+    """rtl/generated/register_file.vhd, or that of a board or a motor: the same with further blocks of addresses."""
     generics = {n: v for n, v in (GENERICS | BOARD_GENERICS).items() if n.lower() in {w.name for w in words}}
     stored = [(word, word.parts[0]) for word in words if writable(word)]
     reads = _reads(words)

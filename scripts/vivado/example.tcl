@@ -7,6 +7,7 @@
 # trip interrupts it.  Converters, encoder, trip and gates go to pins; give them numbers in example.xdc before you
 # write a bitstream.  Reports: OUT_DIR/reports; OUT_DIR/result.md is a row for the table of docs/vivado.md.
 # `fluxproof project drive.toml` writes a script that sets the drive's own values below and sources this one.
+# With hil = 1 the motor is in the FPGA (fluxproof_hil) and no pin of the drive leaves the chip.
 
 set here [file dirname [file normalize [info script]]]
 set root [file normalize [file join $here .. ..]]
@@ -26,7 +27,7 @@ source [file join $here result.tcl]
 # Without a drive: 100 MHz and 10 kHz PWM.
 foreach {name value} {
   clock_hz 100000000 adc_bits 16 position_bits 16 carrier_half 5000 estimators 1 base_address 0x43C00000
-  gate_active 1 trip_active 1 brake_active 1
+  gate_active 1 trip_active 1 brake_active 1 hil 0 encoder 0
 } {
   if {![info exists $name]} {
     set $name $value
@@ -51,7 +52,16 @@ set_property -dict [list \
   CONFIG.PCW_IRQ_F2P_INTR 1] $ps
 set reset [create_bd_cell -type ip -vlnv xilinx.com:ip:proc_sys_reset reset]
 
-set drive [create_bd_cell -type ip -vlnv fluxproof:motor_control:fluxproof_axi drive]
+if {$hil} {
+  add_files [concat [glob [file join $root rtl *.vhd]] [glob [file join $root rtl * *.vhd]]]
+  set_property file_type {VHDL 2008} [get_files *.vhd]
+  # A block design takes only a module of VHDL-93; what that instantiates may be newer.
+  set_property file_type VHDL [get_files fluxproof_hil.vhd]
+  set drive [create_bd_cell -type module -reference fluxproof_hil drive]
+  set_property -dict [list CONFIG.CLOCK_HZ $clock_hz CONFIG.ENCODER $encoder] $drive
+} else {
+  set drive [create_bd_cell -type ip -vlnv fluxproof:motor_control:fluxproof_axi drive]
+}
 set_property -dict [list \
   CONFIG.ADC_BITS $adc_bits \
   CONFIG.POSITION_BITS $position_bits \
@@ -101,10 +111,16 @@ connect_bd_net [get_bd_pins drive/irq] [get_bd_pins interrupts/In0]
 connect_bd_net [get_bd_pins dma/s2mm_introut] [get_bd_pins interrupts/In1]
 connect_bd_net [get_bd_pins interrupts/dout] [get_bd_pins ps/IRQ_F2P]
 
-foreach pin {
-  sample_trigger sample_valid adc_a adc_b adc_c adc_u_dc position_code trip gate_high gate_low brake
-} {
-  make_bd_pins_external -name $pin [get_bd_pins drive/$pin]
+if {$hil} {
+  set no_trip [create_bd_cell -type ip -vlnv xilinx.com:ip:xlconstant no_trip]
+  set_property CONFIG.CONST_VAL [expr {1 - $trip_active}] $no_trip
+  connect_bd_net [get_bd_pins no_trip/dout] [get_bd_pins drive/trip]
+} else {
+  foreach pin {
+    sample_trigger sample_valid adc_a adc_b adc_c adc_u_dc position_code trip gate_high gate_low brake
+  } {
+    make_bd_pins_external -name $pin [get_bd_pins drive/$pin]
+  }
 }
 
 assign_bd_address -offset $base_address -range 4K [get_bd_addr_segs drive/s_axi/*]
@@ -120,8 +136,10 @@ save_bd_design
 set design [get_files example.bd]
 generate_target all $design
 add_files -norecurse [make_wrapper -files $design -top]
-add_files -fileset constrs_1 -norecurse [file join $here example.xdc]
-set_property USED_IN implementation [get_files example.xdc]
+if {!$hil} {
+  add_files -fileset constrs_1 -norecurse [file join $here example.xdc]
+  set_property USED_IN implementation [get_files example.xdc]
+}
 set_property top example_wrapper [get_filesets sources_1]
 update_compile_order -fileset sources_1
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Core and motor in one (`fluxproof_hil`): the RTL alone in Verilator, its gates at every clock against the models.
+"""Core and motor in one (`core_and_motor`): the RTL alone in Verilator, its gates at every clock against the models.
 
 Python sets the references and a load step and only reads: the loop is closed in the RTL.  The golden loop runs beside.
 """
@@ -138,7 +138,7 @@ def rtl_run(of: Parts, golden: Run, load_at: int) -> Run:
     """The RTL for as many clocks; observed values are those at the golden run's triggers."""
     config = of.core.config
     generics = {"ADC_BITS": config.adc_bits, "POSITION_BITS": config.position_bits, "CARRIER_HALF": config.carrier_half}
-    core = VerilatedCore(generics, top=f"fluxproof_hil{FLAT}")
+    core = VerilatedCore(generics, top=f"core_and_motor{FLAT}")
     core.set_many(of.core.values._asdict())
     core.set_many({f"motor_{name}": value for name, value in {**of.motor._asdict(), **of.sensors._asdict()}.items()})
     core.set("motor_u_dc", of.scale.u_dc(of.drive.inverter.dc_bus_v))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Core and motor as models in one compiled loop, clock by clock: what `fluxproof_hil` does, its samples kept.
+"""Core and motor as models in one compiled loop, clock by clock: what `core_and_motor` does, its samples kept.
 
 The same sequence as closed_loop.golden_run, which a test compares: a sample is taken at the trigger, CONVERSION clocks
 later the core gets its codes; the motor makes a step every STEP clocks.  The shaft is held at a speed for each period.
@@ -14,12 +14,12 @@ import numpy as np
 from fluxproof.cosim.golden_loop import mixed_kernel
 from golden_model import clocked, fluxproof
 from golden_model.motor import motor_model, motor_sensors, motor_shaft
-from studies.hil.beside_plant import held
 
 CHAIN, SHAFT = 40, 53  # clocks from a tick to its currents, to its angle
 CONVERSION = 13  # clocks from sample_trigger to sample_valid
 STEP, DROP_THETA = motor_model.STEP, motor_shaft.DROP_THETA
 core_step, motor_step, sensors_step = clocked.step, motor_model.step, motor_sensors.step
+MotorRegisters = motor_model.Registers
 CoreInputs, MotorInputs, SensorInputs = clocked.Inputs, motor_model.Inputs, motor_sensors.Inputs
 sample_step, given_by_registers, Sample = fluxproof.step_given, fluxproof.given_by_registers, fluxproof.Sample
 DUE = {name: after for after, names in clocked.DUE.values() for name in names}
@@ -38,6 +38,31 @@ class Hil(NamedTuple):
     u_dc: int
 
 
+class Moving(NamedTuple):
+    """The motor's registers that are written while it runs, a value a period."""
+
+    omega_set: np.ndarray  # of a held shaft
+    r_a: np.ndarray
+    r_b: np.ndarray
+    r_c: np.ndarray
+    psi_m: np.ndarray
+
+
+def constant(motor: motor_model.Registers, periods: int) -> Moving:
+    """Registers that stay."""
+    return Moving(*(np.full(periods, getattr(motor, name), np.int64) for name in Moving._fields))
+
+
+@mixed_kernel
+def written(r, moving, row):
+    """The registers in a period."""
+    return MotorRegisters(
+        r.stiffness, r.v_switch, r.v_diode, moving.r_a[row], moving.r_b[row], moving.r_c[row], r.psi_start,
+        moving.psi_m[row], r.inv_l_d, r.inv_l_q, r.k_j, r.viscous, r.coulomb, r.pole_pairs, r.hold,
+        moving.omega_set[row],
+    )  # fmt: skip
+
+
 @mixed_kernel
 def chosen(chains, behind):
     """The chain that stands at the outputs, so many steps behind."""
@@ -51,14 +76,14 @@ def chosen(chains, behind):
 
 
 @mixed_kernel
-def run_clocks(hil, asked, omega_set, states, samples, observed):
+def run_clocks(hil, asked, moving, states, samples, observed):
     """Fills a row of ``samples`` and ``observed`` in each period.
 
-    ``asked`` (n, 7): the fields of Sample after the codes, without run; ``omega_set`` (n,): held speed of the motor.
+    ``asked`` (n, 7): the fields of Sample after the codes, without run; ``moving``: see Moving.
     ``states``: of core, its samples, motor and sensors.
     """
     core, of_samples, motor, random = states
-    regs, config, motor_regs = hil.core, hil.config, held(hil.motor, omega_set[0])
+    regs, config, motor_regs = hil.core, hil.config, written(hil.motor, moving, 0)
     still = MotorInputs(hil.u_dc, 0, 0, 0, 0, 0, 0, 0, 0)
     motor, _ = motor_step(motor, still, motor_regs, hil.tables, STEP)
     nothing = CoreInputs(0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
@@ -101,8 +126,8 @@ def run_clocks(hil, asked, omega_set, states, samples, observed):
                 o.encoder_lost, 0, o.brake_asked, o.compare_a, o.compare_b, o.compare_c,
             )  # fmt: skip
             entered_at, row = clock, row + 1
-            if row < len(omega_set):
-                motor_regs = held(hil.motor, omega_set[row])
+            if row < len(samples):
+                motor_regs = written(hil.motor, moving, row)
         clock += 1
         if clock % STEP == 0:
             now = MotorInputs(hil.u_dc, 0, 0, counts[0], counts[3], counts[1], counts[4], counts[2], counts[5])
@@ -123,11 +148,11 @@ def run_clocks(hil, asked, omega_set, states, samples, observed):
     return clock
 
 
-def record(hil: Hil, asked: np.ndarray, omega_set: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+def record(hil: Hil, asked: np.ndarray, moving: Moving) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """(samples (n, 13), {name of Observed: (n,)}) from reset."""
     names = fluxproof.Observed._fields
     samples = np.zeros((len(asked), len(fluxproof.Sample._fields)), np.int64)
     observed = np.zeros((len(asked), len(names)), np.int64)
     states = (clocked.State(), fluxproof.State(), motor_model.State(), motor_sensors.State())
-    run_clocks(hil, asked, omega_set, states, samples, observed)
+    run_clocks(hil, asked, moving, states, samples, observed)
     return samples, dict(zip(names, observed.T, strict=True))

@@ -82,6 +82,9 @@ def test_what_is_found_beside_the_drive_file_is_added_to_it(tmp_path):
     assert in_addition({"inverter.dead_time_s": 2e-7}, nominal)["inverter.dead_time_s"] == pytest.approx(1.2e-6)
     # The core's own section commands the gates: what is lost there is not known.
     assert in_addition({"inverter.dead_time_s": 2e-7}, NOMINAL)["inverter.dead_time_s"] == 2e-7
+    drive.write_text(PAPER.read_text() + "\n[plant.timing]\nsampling_skew_s = -1e-6\n")
+    more = in_addition({"timing.sampling_skew_s": 3e-7}, load_nominal(drive))
+    assert more["timing.sampling_skew_s"] == pytest.approx(-7e-7)
     assert in_addition({"machine.iron_conductance_s": 1e-4}, NOMINAL) == {"machine.iron_conductance_s": 1e-4}
 
 

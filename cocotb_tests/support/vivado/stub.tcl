@@ -39,7 +39,7 @@ array set known {
   report_cdc            {{-file 1} 0 0}
   report_drc            {{-file 1} 0 0}
   create_bd_design      {{} 1 1}
-  create_bd_cell        {{-type 1 -vlnv 1} 1 1}
+  create_bd_cell        {{-type 1 -vlnv 1 -reference 1} 1 1}
   apply_bd_automation   {{-rule 1 -config 1} 1 1}
   get_bd_pins           {{} 1 1}
   get_bd_intf_pins      {{} 1 1}
@@ -92,6 +92,7 @@ array set vendor_pins {
   xilinx.com:ip:axi_dma {s_axi_lite_aclk m_axi_s2mm_aclk m_axi_sg_aclk axi_resetn s2mm_introut}
   xilinx.com:ip:smartconnect {aclk aresetn}
   xilinx.com:ip:xlconcat {In0 In1 dout}
+  xilinx.com:ip:xlconstant {dout}
 }
 array set vendor_interfaces {
   xilinx.com:ip:processing_system7 {M_AXI_GP0 S_AXI_HP0}
@@ -99,6 +100,7 @@ array set vendor_interfaces {
   xilinx.com:ip:axi_dma {S_AXI_LITE S_AXIS_S2MM M_AXI_S2MM M_AXI_SG}
   xilinx.com:ip:smartconnect {S00_AXI S01_AXI M00_AXI M01_AXI}
   xilinx.com:ip:xlconcat {}
+  xilinx.com:ip:xlconstant {}
 }
 set properties {
   file_type USED_IN top ip_repo_paths name version description display_name
@@ -219,6 +221,9 @@ proc do_read_xdc {options name} {
   source $name
 }
 proc do_synth_design {options} {
+  if {[dict get $options -top] ne [lindex [split $::core_vlnv :] 2]} {
+    take_module [dict get $options -top]
+  }
   foreach generic [dict get $options -generic] {
     if {[lindex [split $generic =] 0] ni $::core_parameters} {
       error "synth_design: the top has no generic $generic"
@@ -301,7 +306,37 @@ proc cell_of_core {} {
   }
   return ""
 }
+# What a top that is no packaged core has, from its VHDL: it takes the place of the core.
+proc take_module {name} {
+  set path [lindex [lsearch -all -inline -glob $::files "*/$name.vhd"] 0]
+  if {$path eq ""} {
+    error "no file $name.vhd was added"
+  }
+  set handle [open $path]
+  set text [read $handle]
+  close $handle
+  regexp "entity $name is(.*)end entity $name;" $text -> text
+  regexp {generic \((.*)\n  \);\n  port \((.*)} $text -> generics ports
+  set ::core_parameters {}
+  foreach {- word} [regexp -all -inline -line {^    (\w+) +:} $generics] {
+    lappend ::core_parameters $word
+  }
+  set ::core_pins {}
+  set ::core_outputs {}
+  foreach {- word mode} [regexp -all -inline -line {^    (\w+) +: (in|out) } $ports] {
+    lappend ::core_pins $word
+    if {$mode eq "out"} {
+      lappend ::core_outputs $word
+    }
+  }
+  set ::core_vlnv "module $name"
+}
 proc do_create_bd_cell {options name} {
+  if {[dict exists $options -reference]} {
+    take_module [dict get $options -reference]
+    set ::cells($name) $::core_vlnv
+    return $name
+  }
   set vlnv [dict get $options -vlnv]
   if {![info exists ::vendor_pins($vlnv)] && $vlnv ne $::core_vlnv} {
     error "create_bd_cell: no core $vlnv"
@@ -347,11 +382,16 @@ proc do_make_bd_pins_external {options pin} {
 }
 proc do_validate_bd_design {options} {
   set cell [cell_of_core]
-  source [file join $::packaged bd bd.tcl]
-  init $cell {}
-  propagate $cell {}
+  set open {}
+  if {[string match "module *" $::core_vlnv]} {
+    set open $::core_outputs
+  } else {
+    source [file join $::packaged bd bd.tcl]
+    init $cell {}
+    propagate $cell {}
+  }
   foreach pin [concat $::core_pins $::core_interfaces] {
-    if {![regexp {^(s_axi|m_axis)_} $pin] && ![info exists ::connected($cell/$pin)]} {
+    if {$pin ni $open && ![regexp {^(s_axi|m_axis)_} $pin] && ![info exists ::connected($cell/$pin)]} {
       error "validate_bd_design: $cell/$pin is not connected"
     }
   }

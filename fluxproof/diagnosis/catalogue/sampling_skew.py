@@ -6,6 +6,7 @@ import numpy as np
 from fluxproof.diagnosis.balance.late_pulses import instant, off_valley
 from fluxproof.diagnosis.effects import (
     Alternatives,
+    Described,
     FreeCurve,
     MeasurementError,
     Parameter,
@@ -48,7 +49,7 @@ def _ripples(view):
     return {"pulses": off_valley(view, at) / (at * period or 1.0), "shift": step / (2.0 * STEP * period)}
 
 
-class SamplingSkew(MeasurementError, FreeCurve, Alternatives):
+class SamplingSkew(MeasurementError, FreeCurve, Alternatives, Described):
     corrected_last = True
     one_of = (("tau",), ("angle",), ("pulses", "shift", "filter"))
 
@@ -115,6 +116,12 @@ class SamplingSkew(MeasurementError, FreeCurve, Alternatives):
         weights = np.array([WEIGHTS[name] for name in c])
         spread = np.sqrt(max(weights @ covariance @ weights, 0.0))
         return one("skew_s", "s", sum(WEIGHTS[name] * value for name, value in c.items()), spread)
+
+    def given(self, view, plant):
+        late = plant.timing.sampling_skew_s
+        if not late:
+            return {}
+        return current_error(view, late * zero_vector_slope(view) + off_valley(view, late / view.sample_time_s))
 
     def plant(self, c, nominal):
         return {"timing.sampling_skew_s": c.get("tau", 0.0) + c.get("pulses", 0.0) + c.get("shift", 0.0)}

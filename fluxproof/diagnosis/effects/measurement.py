@@ -9,7 +9,8 @@ from fluxproof.diagnosis.effects.effect import Effect
 class MeasurementError(Effect):
     """A measurement error: found, it is removed from the recorded data, and all columns are computed anew.
 
-    A drive file cannot take it out of a recording that has it; ``plant`` describes it for the next one.
+    A drive file cannot take it out of a recording that has it, unless it is Described; ``plant`` describes it for the
+    next one.
     """
 
     corrected_last: bool = False  # of several: its correction uses the corrected currents

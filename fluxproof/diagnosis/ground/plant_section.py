@@ -41,7 +41,7 @@ class Plant(NamedTuple):
 ADDS = {
     "machine.saturation_d_per_a2", "machine.saturation_q_per_a2", "machine.cross_saturation_wb_per_a2",
     "machine.iron_conductance_s", "machine.phase_resistance_asymmetry", HARMONICS,
-    "machine.resistance_temp_coeff_per_k", "inverter.dead_time_s",
+    "machine.resistance_temp_coeff_per_k", "inverter.dead_time_s", "timing.sampling_skew_s",
 }  # fmt: skip
 ORDERED = ("inverter.dead_time_s",)
 # Keys for which the plant rejects negative values; a noisy estimate of zero may be negative and is clipped.

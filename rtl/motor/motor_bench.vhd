@@ -1,32 +1,27 @@
 -- SPDX-License-Identifier: BSD-3-Clause
--- Purpose: the core and a motor in one: the core's gates drive the motor, the motor's sensors are the core's samples.
--- Only wiring.  At sample_trigger currents, bus and angle are held, as converters do; their codes enter the core 13
--- clocks later.  Of given only references and flags are used, the codes come from the sensors.
+-- Purpose: a motor to test against: gates in; codes of a sample, encoder pins and the motor's values out.
+-- Only wiring.  At sample_trigger currents, bus and angle are held, as converters do; their codes come 12 clocks later.
+-- position_now: the code of the angle of now, for a front end that latches it at the trigger.
 -- Formats: those of the blocks; docs/hil.md.
--- Latency: 13 clocks from sample_trigger to sample_valid.  Interval: a PWM period, or half of one.
--- Rounding: none.
+-- Latency: 12 clocks from sample_trigger to codes_valid.  Interval: as far as that.
+-- Rounding: the code of the angle is cut.
 
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 use work.fluxproof_pkg.all;
 
-entity fluxproof_hil is
+entity motor_bench is
   generic (
-    ADC_BITS      : positive range 12 to 16   := 12;
-    POSITION_BITS : positive range 12 to 18   := 16;
-    CARRIER_HALF  : positive range 8 to 32767 := 2500;
-    ESTIMATORS    : natural range 0 to 1      := 1
+    ADC_BITS      : positive range 12 to 16 := 12;
+    POSITION_BITS : positive range 12 to 18 := 16
   );
   port (
     clk                 : in  std_logic;
     rst                 : in  std_logic;
-    given               : in  sample_t;
-    settings            : in  settings_t;
-    enable              : in  std_logic;
-    trip                : in  std_logic;
-    clear_trip          : in  std_logic;
-    host_write          : in  std_logic;
+    gate_high           : in  unsigned(2 downto 0);
+    gate_low            : in  unsigned(2 downto 0);
+    sample_trigger      : in  std_logic;
     motor_u_dc          : in  signed(MOTOR_VOLTAGE_W - 1 downto 0);
     motor_load          : in  signed(FLUX_W - 1 downto 0);
     motor_start         : in  std_logic;
@@ -50,7 +45,8 @@ entity fluxproof_hil is
     motor_table_write   : in  std_logic;
     motor_table_select  : in  unsigned(1 downto 0);
     motor_table_at      : in  unsigned(11 downto 0);
-    motor_table_word    : in  unsigned(35 downto 0);
+    motor_table_high    : in  unsigned(17 downto 0);
+    motor_table_low     : in  unsigned(17 downto 0);
     motor_scale_a       : in  signed(24 downto 0);
     motor_scale_b       : in  signed(24 downto 0);
     motor_scale_c       : in  signed(24 downto 0);
@@ -62,16 +58,22 @@ entity fluxproof_hil is
     motor_noise_i       : in  unsigned(7 downto 0);
     motor_noise_u       : in  unsigned(7 downto 0);
     motor_angle_offset  : in  unsigned(MOTOR_ANGLE_W - 1 downto 0);
-    gate_high           : out unsigned(2 downto 0);
-    gate_low            : out unsigned(2 downto 0);
-    sample_trigger      : out std_logic;
-    sample_valid        : out std_logic;
-    running             : out std_logic;
-    tripped             : out std_logic;
-    fault_flags         : out unsigned(15 downto 0);
-    values_valid        : out std_logic;
-    observed            : out observed_t;
-    estimated           : out estimated_t;
+    motor_counts        : in  unsigned(15 downto 0);
+    motor_hall_offset   : in  unsigned(MOTOR_ANGLE_W - 1 downto 0);
+    codes_valid         : out std_logic;
+    code_a              : out unsigned(ADC_BITS - 1 downto 0);
+    code_b              : out unsigned(ADC_BITS - 1 downto 0);
+    code_c              : out unsigned(ADC_BITS - 1 downto 0);
+    code_u_dc           : out unsigned(ADC_BITS - 1 downto 0);
+    code_theta          : out unsigned(POSITION_BITS - 1 downto 0);
+    position_now        : out unsigned(POSITION_BITS - 1 downto 0);
+    pin_a               : out std_logic;
+    pin_b               : out std_logic;
+    pin_z               : out std_logic;
+    hall_a              : out std_logic;
+    hall_b              : out std_logic;
+    hall_c              : out std_logic;
+    motor_ready         : out std_logic;
     motor_i_a           : out signed(PU_W - 1 downto 0);
     motor_i_b           : out signed(PU_W - 1 downto 0);
     motor_i_c           : out signed(PU_W - 1 downto 0);
@@ -81,35 +83,26 @@ entity fluxproof_hil is
     motor_theta_e       : out unsigned(MOTOR_ANGLE_W - 1 downto 0);
     motor_shoot_through : out std_logic
   );
-end entity fluxproof_hil;
+end entity motor_bench;
 
-architecture rtl of fluxproof_hil is
-  signal trigger    : std_logic;
-  signal sample     : sample_t;
-  signal entered    : std_logic;
-  signal ready      : std_logic;
-  signal held       : std_logic;
-  signal converted  : std_logic;
-  signal i_a_1      : signed(PU_W - 1 downto 0);
-  signal i_b_1      : signed(PU_W - 1 downto 0);
-  signal i_c_1      : signed(PU_W - 1 downto 0);
-  signal u_dc_1     : signed(MOTOR_VOLTAGE_W - 1 downto 0);
-  signal theta_m_1  : unsigned(MOTOR_ANGLE_W - 1 downto 0);
-  signal code_a     : unsigned(ADC_BITS - 1 downto 0);
-  signal code_b     : unsigned(ADC_BITS - 1 downto 0);
-  signal code_c     : unsigned(ADC_BITS - 1 downto 0);
-  signal code_u_dc  : unsigned(ADC_BITS - 1 downto 0);
-  signal code_theta : unsigned(POSITION_BITS - 1 downto 0);
+architecture rtl of motor_bench is
+  signal held      : std_logic;
+  signal i_a_1     : signed(PU_W - 1 downto 0);
+  signal i_b_1     : signed(PU_W - 1 downto 0);
+  signal i_c_1     : signed(PU_W - 1 downto 0);
+  signal u_dc_1    : signed(MOTOR_VOLTAGE_W - 1 downto 0);
+  signal theta_m_1 : unsigned(MOTOR_ANGLE_W - 1 downto 0);
+  signal seen      : unsigned(MOTOR_ANGLE_W - 1 downto 0);
 begin
-  sample_trigger <= trigger;
-  sample_valid   <= entered;
+  seen         <= motor_theta_m + motor_angle_offset;
+  position_now <= seen(MOTOR_ANGLE_W - 1 downto MOTOR_ANGLE_W - POSITION_BITS);
 
+  -- Sample and hold
   process (clk)
   begin
     if rising_edge(clk) then
-      -- Sample and hold
-      held <= trigger;
-      if trigger = '1' then
+      held <= sample_trigger;
+      if sample_trigger = '1' then
         i_a_1     <= motor_i_a;
         i_b_1     <= motor_i_b;
         i_c_1     <= motor_i_c;
@@ -117,43 +110,18 @@ begin
         theta_m_1 <= motor_theta_m;
       end if;
 
-      if ready = '0' then
+      if motor_ready = '0' then
         i_a_1     <= (others => '0');
         i_b_1     <= (others => '0');
         i_c_1     <= (others => '0');
         theta_m_1 <= (others => '0');
       end if;
 
-      -- The sample of the core
-      entered <= converted;
-      if converted = '1' then
-        sample               <= given;
-        sample.adc_a         <= resize(code_a, CODE_W);
-        sample.adc_b         <= resize(code_b, CODE_W);
-        sample.adc_c         <= resize(code_c, CODE_W);
-        sample.adc_u_dc      <= resize(code_u_dc, CODE_W);
-        sample.position_code <= resize(code_theta, TURN_W);
-      end if;
-
       if rst = '1' then
-        held    <= '0';
-        entered <= '0';
+        held <= '0';
       end if;
     end if;
   end process;
-
-  core : entity work.fluxproof
-    generic map (
-      ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS, CARRIER_HALF => CARRIER_HALF, ESTIMATORS => ESTIMATORS
-    )
-    port map (
-      clk => clk, rst => rst, sample_valid => entered, sample => sample, settings => settings, enable => enable,
-      trip => trip, clear_trip => clear_trip, host_write => host_write, gate_high => gate_high, gate_low => gate_low,
-      sample_trigger => trigger, running => running, tripped => tripped, fault_flags => fault_flags,
-      values_valid => values_valid, observed => observed, estimated => estimated, sample_busy => open, brake => open,
-      first_fault => open, early_samples => open, setting_refused => open, min_pulse_used => open,
-      double_used => open, carrier => open, duty_valid => open, compare_valid => open
-    );
 
   load_machine : entity work.motor_model
     port map (
@@ -163,8 +131,8 @@ begin
       psi_start => motor_psi_start, psi_m => motor_psi_m, inv_l_d => motor_inv_l_d, inv_l_q => motor_inv_l_q,
       k_j => motor_k_j, viscous => motor_viscous, coulomb => motor_coulomb, pole_pairs => motor_pole_pairs,
       hold => motor_hold, omega_set => motor_omega_set, table_write => motor_table_write,
-      table_select => motor_table_select, table_at => motor_table_at, table_word => motor_table_word, tick => open,
-      ready => ready, i_a => motor_i_a, i_b => motor_i_b, i_c => motor_i_c, torque => motor_torque,
+      table_select => motor_table_select, table_at => motor_table_at, table_word => motor_table_high & motor_table_low, tick => open,
+      ready => motor_ready, i_a => motor_i_a, i_b => motor_i_b, i_c => motor_i_c, torque => motor_torque,
       omega_m => motor_omega_m, theta_m => motor_theta_m, theta_e => motor_theta_e,
       shoot_through => motor_shoot_through
     );
@@ -176,8 +144,15 @@ begin
       theta_m => theta_m_1, scale_a => motor_scale_a, scale_b => motor_scale_b, scale_c => motor_scale_c,
       scale_u => motor_scale_u, zero_a => motor_zero_a, zero_b => motor_zero_b, zero_c => motor_zero_c,
       zero_u => motor_zero_u, noise_i => motor_noise_i, noise_u => motor_noise_u, angle_offset => motor_angle_offset,
-      out_valid => converted, code_a => code_a, code_b => code_b, code_c => code_c, code_u_dc => code_u_dc,
+      out_valid => codes_valid, code_a => code_a, code_b => code_b, code_c => code_c, code_u_dc => code_u_dc,
       code_theta => code_theta
+    );
+
+  encoder : entity work.motor_encoder
+    port map (
+      clk => clk, rst => rst, in_valid => '1', theta_m => motor_theta_m, theta_e => motor_theta_e,
+      counts => motor_counts, hall_offset => motor_hall_offset, out_valid => open, pin_a => pin_a, pin_b => pin_b,
+      pin_z => pin_z, hall_a => hall_a, hall_b => hall_b, hall_c => hall_c
     );
 
 end architecture rtl;

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""fluxproof_hil: a drive without a motor; software that knows nothing of it runs on its registers."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+
+import pytest
+
+from cocotb_tests.support.drives import PAPER
+from cocotb_tests.support.host.bring_up import compiled
+from cocotb_tests.support.host.hil_board import HilBoard
+from cocotb_tests.support.needs import skip_without_ghdl5
+from fluxproof.checkout import ROOT
+from fluxproof.diagnosis.ground.plant_section import plant_of
+from fluxproof.hil.load import erase_words, load_words
+from golden_model import drive as drives
+from golden_model.drive_keys import DriveError
+from golden_model.front_ends import Encoder
+from golden_model.io import motor_map
+from golden_model.io.register_map import OKAY
+
+HALF = 1700  # clocks of half a period: a step of the motor is 0.5 us
+RPM = 9.549297
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return drives.with_carrier(drives.load(PAPER), HALF)
+
+
+def test_every_word_of_a_motor_fits_its_register(drive):
+    """The rotor is held meanwhile; tables of zeros are left to the block RAM, and erased where others were there."""
+    plant, ports = plant_of(PAPER), motor_map.registers()
+    machine = dataclasses.replace(plant.machine, saturation_q_per_a2=4e-3, cogging_amplitude_nm=0.1, cogging_order=12)
+    for words in (load_words(drive, machine, plant.inverter, plant.sensors), erase_words()):
+        for name, value in words:
+            assert ports[name].port.low <= value <= ports[name].port.high and ports[name].kind.writable, name
+    words = load_words(drive, machine, plant.inverter, plant.sensors)
+    assert words[0] == ("motor_start", 1) and words[-1] == ("motor_start", 0)
+    written = {name for name, _ in words}
+    assert set(ports) - written == {n for n in ports if not n.startswith("motor_") or not ports[n].kind.writable}
+    assert sum(name == "motor_table_write" for name, _ in words) > 4000
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"sensors": {"eccentricity_once_rad": 0.01}}, r"\[plant.sensors\] eccentricity_once_rad = 0.01"),
+        ({"machine": {"iron_conductance_s": 1e-4}}, r"\[plant.machine\] iron_conductance_s = 0.0001"),
+        ({"machine": {"inertia_kgm2": 1e-7}}, r"motor: k_j = .* does not fit"),
+    ],
+)
+def test_what_the_motor_does_not_have_is_refused(drive, changes, said):
+    plant = plant_of(PAPER)
+    names = ("machine", "inverter", "sensors")
+    parts = {n: dataclasses.replace(getattr(plant, n), **changes.get(n, {})) for n in names}
+    with pytest.raises(DriveError, match=said):
+        load_words(drive, *parts.values())
+    with pytest.raises(DriveError, match=r'\[encoder\] kind = "biss"'):
+        load_words(dataclasses.replace(drive, encoder=Encoder("biss")), plant.machine, plant.inverter, plant.sensors)
+
+
+@pytest.mark.slow
+def test_bring_up_turns_the_motor_in_the_rtl(drive, tmp_path):
+    """bring_up.c as it is, in Verilator: nothing but clocks outside; the motor's registers on the same bus."""
+    skip_without_ghdl5()
+    plant = plant_of(PAPER)
+    board = HilBoard(drive, plant.machine, plant.inverter, plant.sensors)
+    loaded = dict(load_words(drive, plant.machine, plant.inverter, plant.sensors))
+    assert board.value("motor_psi_m") == loaded["motor_psi_m"]
+    assert board.write(motor_map.registers()["motor_i_a"].address, 0) != OKAY
+    program = compiled(tmp_path, drive, ROOT / "cocotb_tests" / "support" / "host" / "bus_pipe.c")
+    done = board.run(program, "300")
+    assert done.returncode == 0, done.stdout + done.stderr
+    said = re.search(r"300 rpm wanted, ([\d.]+) rpm measured", done.stdout)
+    assert said and abs(float(said[1]) - 300) < 12, done.stdout
+    assert abs(max(board.speeds) * RPM - 300) < 12 and abs(board.speeds[-1] * RPM) < 5
+    assert board.gate_word == 0 and board.value("motor_shoot_through") == 0

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A board with the HIL top on it: the motor is in the RTL, so that time is clocks and nothing else moves."""
+
+from __future__ import annotations
+
+import math
+
+from cocotb_tests.support.host.rtl_board import RtlBoard
+from fluxproof.hil.load import Word, load_words
+from fluxproof.plant import Inverter, Machine, Sensors
+from golden_model.formats import MOTOR_SPEED
+from golden_model.io import motor_map
+from golden_model.io.register_map import OKAY
+from golden_model.motor.motor_model import STEP
+
+
+class HilBoard(RtlBoard):
+    """``machine``, ``inverter``, ``sensors``: of the motor; its registers are loaded over the bus at the start."""
+
+    top = "fluxproof_hil"
+
+    def __init__(self, drive, machine: Machine, inverter: Inverter, sensors: Sensors):
+        super().__init__(drive)
+        self.map = motor_map.registers()
+        self.load(load_words(drive, machine, inverter, sensors))
+        self.turn_rad_s = 2.0 * math.pi * drive.core.clock_hz / STEP * MOTOR_SPEED.lsb
+
+    def load(self, words: list[Word]) -> None:
+        for name, value in words:
+            assert self.write(self.map[name].address, value & 0xFFFFFFFF) == OKAY, name
+
+    def value(self, name: str) -> int:
+        """A register of the motor."""
+        word = self.read(self.map[name].address)[1]
+        return word - (word >> 31 << 32) if self.map[name].port.fmt.signed else word
+
+    def run_period(self) -> None:
+        self.speeds.append(self.value("motor_omega_m") * self.turn_rad_s)
+        spent = self.core.clock - self.began
+        clocks, _, _ = self.core.run_period(self.limit)
+        self.began = self.core.clock
+        self.time += (spent + clocks) * self.clock_s
+        self.gate_word = self.core.gate_word
+        self.number += 1
