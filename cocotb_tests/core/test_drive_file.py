@@ -102,6 +102,12 @@ WRONG = {  # section, line, what the message must contain besides the file's nam
         "low_side_settle_s = 2e-06 and dead_time_s = 2e-06",
         "before the sample",
     ),
+    "trip filter": (
+        "core",
+        "trip_filter_s = 5.12e-6",
+        "[core] trip_filter_s = 5.12e-06",
+        "up to 5.115e-06 s, 1023 clocks",
+    ),
     "min pulse": ("inverter", "min_pulse_s = 60e-6", "[inverter] min_pulse_s", "5e-05 s"),
     "bus": ("inverter", "dc_bus_v = 900", "[inverter] dc_bus_v = 900", "sqrt(3)", "866.025 V"),
     "bus range": ("inverter", "dc_bus_v = 1100", "[inverter] dc_bus_v = 1100", "u_dc_range_v = 1000 V"),
