@@ -212,6 +212,12 @@ class Core:
     gate_active: int = whole(0, 1, "level of the gate pins at which a switch is on", 1)
     trip_active: int = whole(0, 1, "level of the pin trip that turns the gates off", 1)
     brake_active: int = whole(0, 1, "level of the pin brake at which the resistor is on", 1)
+    trip_filter_s: float = not_negative("s", "shorter pulses of the pin trip have no effect; 0: all trip", 0.0, 1e-5)
+
+    @property
+    def trip_filter_clocks(self):
+        """Generic TRIP_FILTER: a shorter pulse is seen by no more clocks than these."""
+        return math.ceil(self.trip_filter_s * self.clock_hz * (1.0 - 1e-9))
 
 
 @dataclass(frozen=True)

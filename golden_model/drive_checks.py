@@ -3,6 +3,7 @@
 
 import math
 
+from golden_model.common.input_filter import FILTER
 from golden_model.drive_keys import DriveError
 from golden_model.fluxproof import SAMPLE_INTERVAL
 from golden_model.formats import PU, VECTOR
@@ -169,6 +170,13 @@ def _flux(drive):
             _refuse(f"[machine] {key} times the current limit", flux, f"up to {most:g} Wb, {why}")
 
 
+def _trip_filter(drive):
+    clocks, most = drive.core.trip_filter_clocks, FILTER.hi
+    if clocks > most:
+        allowed = f"up to {most / drive.core.clock_hz:g} s, {most} clocks of [core] clock_hz = {drive.core.clock_hz:g}"
+        _refuse("[core] trip_filter_s", drive.core.trip_filter_s, allowed)
+
+
 def _codes(drive):
     top = 2**drive.sensors.adc_bits - 1
     for code in drive.sensors.current_offset_code or ():
@@ -274,6 +282,6 @@ def _regeneration(drive):
 
 RULES = (
     _sample_time, _sampling, _carrier, _pulses, _low_side, _samples_per_turn, _voltage, _current, _flux, _codes,
-    _speed_loop, _current_loop, _flux_loop, _adaline_steps, _protection, _regeneration, _residual,
+    _trip_filter, _speed_loop, _current_loop, _flux_loop, _adaline_steps, _protection, _regeneration, _residual,
     check_encoder, check_converters, check_position,
 )  # fmt: skip

@@ -16,6 +16,7 @@ proc init_gui {IPINST} {
   ipgui::add_param $IPINST -name "GATE_ACTIVE" -parent ${page}
   ipgui::add_param $IPINST -name "TRIP_ACTIVE" -parent ${page}
   ipgui::add_param $IPINST -name "BRAKE_ACTIVE" -parent ${page}
+  ipgui::add_param $IPINST -name "TRIP_FILTER" -parent ${page}
 }
 
 proc update_PARAM_VALUE.CLOCK_HZ {PARAM_VALUE.CLOCK_HZ} {
@@ -148,4 +149,15 @@ proc validate_PARAM_VALUE.BRAKE_ACTIVE {PARAM_VALUE.BRAKE_ACTIVE} {
 
 proc update_MODELPARAM_VALUE.BRAKE_ACTIVE {MODELPARAM_VALUE.BRAKE_ACTIVE PARAM_VALUE.BRAKE_ACTIVE} {
   set_property value [get_property value ${PARAM_VALUE.BRAKE_ACTIVE}] ${MODELPARAM_VALUE.BRAKE_ACTIVE}
+}
+
+proc update_PARAM_VALUE.TRIP_FILTER {PARAM_VALUE.TRIP_FILTER} {
+}
+
+proc validate_PARAM_VALUE.TRIP_FILTER {PARAM_VALUE.TRIP_FILTER} {
+  return true
+}
+
+proc update_MODELPARAM_VALUE.TRIP_FILTER {MODELPARAM_VALUE.TRIP_FILTER PARAM_VALUE.TRIP_FILTER} {
+  set_property value [get_property value ${PARAM_VALUE.TRIP_FILTER}] ${MODELPARAM_VALUE.TRIP_FILTER}
 }

@@ -8,11 +8,14 @@ import pytest
 from fluxproof.cosim import ghdl
 
 
-@pytest.mark.parametrize("levels", [(1, 1, 1), (0, 0, 0), (0, 1, 1), (1, 0, 0)])
-def test_power_stage(levels):
-    """``levels`` of gates, trip and brake at which they are active."""
-    generics = dict(zip(("GATE_ACTIVE", "TRIP_ACTIVE", "BRAKE_ACTIVE"), levels, strict=True))
-    environment = {"ACTIVE_LEVELS": json.dumps(levels)}
+@pytest.mark.parametrize(
+    ("levels", "clocks"),
+    [((1, 1, 1), 0), ((0, 0, 0), 0), ((0, 1, 1), 0), ((1, 0, 0), 0), ((1, 0, 1), 5), ((0, 1, 0), 2)],
+)
+def test_power_stage(levels, clocks):
+    """``levels`` of gates, trip and brake at which they are active; ``clocks`` of the filter of trip."""
+    generics = dict(zip(("GATE_ACTIVE", "TRIP_ACTIVE", "BRAKE_ACTIVE"), levels, strict=True)) | {"TRIP_FILTER": clocks}
+    environment = {"ACTIVE_LEVELS": json.dumps(levels), "TRIP_FILTER": str(clocks)}
     folder = ghdl.run("power_stage", "cocotb_tests.support.in_simulator.dut_power_stage", generics, environment)
     problem = ghdl.failure(folder)
     assert problem is None, problem

@@ -33,7 +33,8 @@ def test_the_instances_have_these_names():
 
 
 PINS = (
-    "stage/caught_reg/PRE", "position/edges/filter_a/sync_1_reg/D", "converters/spi/frame/busy_meta_reg/D",
+    "stage/caught_reg/PRE", "stage/filtered.filter/sync_1_reg/D",
+    "position/edges/filter_a/sync_1_reg/D", "converters/spi/frame/busy_meta_reg/D",
     "converters/bits/clock_meta_reg/D", "converters/spi/words/miso_meta_reg[0]/D", "converters/bits/data_meta_reg[3]/D",
 )  # fmt: skip
 
@@ -45,15 +46,15 @@ def test_every_pattern_finds_its_pins_wherever_the_board_is(tmp_path, above):
     facts.write_text("set design_pins {" + " ".join(above + pin for pin in PINS) + "}\n")
     done = stubbed(facts, ROOT / "scripts" / "vivado" / "fluxproof_board.xdc")
     assert done.returncode == 0, done.stderr
-    assert done.stdout.count("\nset_false_path") == 4 and done.stdout.count("\nset_max_delay") == 2
+    assert done.stdout.count("\nset_false_path") == 5 and done.stdout.count("\nset_max_delay") == 2
     counted = stubbed(facts, ROOT / "scripts" / "vivado" / "board_pins.tcl")
     told = re.findall(r"^fluxproof_board.xdc: (\d+) pins match", counted.stdout, re.MULTILINE)
-    assert told == ["1"] * len(PINS) and "6 pins in all" in counted.stdout, counted.stdout + counted.stderr
+    assert told == ["1"] * len(PINS) and "7 pins in all" in counted.stdout, counted.stdout + counted.stderr
 
 
 def test_what_is_not_built_counts_as_nothing_and_a_missing_board_is_an_error(tmp_path):
     facts = tmp_path / "facts.tcl"
-    facts.write_text(f"set design_pins {{drive/{PINS[0]} drive/{PINS[1]}}}\n")
+    facts.write_text(f"set design_pins {{drive/{PINS[0]} drive/{PINS[2]}}}\n")
     counted = stubbed(facts, ROOT / "scripts" / "vivado" / "board_pins.tcl")
     assert counted.returncode == 0 and "0 pins match *converters/*/busy_meta_reg/D" in counted.stdout
     facts.write_text(f"set design_pins {{drive/{PINS[1]}}}\n")

@@ -109,6 +109,12 @@ WRONG = {  # section, line, what the message must contain besides the file's nam
         "[sensors] low_side_settle_s = 2.4e-05 is out of range: allowed is below 2.3e-05 s",
         "a quarter of the PWM period",
     ),
+    "trip filter": (
+        "core",
+        "trip_filter_s = 5.12e-6",
+        "[core] trip_filter_s = 5.12e-06",
+        "up to 5.115e-06 s, 1023 clocks",
+    ),
     "min pulse": ("inverter", "min_pulse_s = 60e-6", "[inverter] min_pulse_s", "5e-05 s"),
     "bus": ("inverter", "dc_bus_v = 900", "[inverter] dc_bus_v = 900", "sqrt(3)", "866.025 V"),
     "bus range": ("inverter", "dc_bus_v = 1100", "[inverter] dc_bus_v = 1100", "u_dc_range_v = 1000 V"),

@@ -77,7 +77,7 @@ def test_nothing_else_depends_on_the_clock(tmp_path):
 def test_generics_are_those_of_the_top(tmp_path):
     folder, files, drive = made(tmp_path, adc_bits="12", position_bits="14")
     config = registers(drive).config._asdict() | {"clock_hz": 200_000_000}
-    config |= {"ring_rows": 0, "gate_active": 1, "trip_active": 1, "brake_active": 1}
+    config |= {"ring_rows": 0, "gate_active": 1, "trip_active": 1, "brake_active": 1, "trip_filter": 0}
     for name in axi_top.GENERICS:
         assert f"set {name.lower()} {config[name.lower()]}\n" in files["project.tcl"]
         assert re.search(rf"{name} +: natural := {config[name.lower()]};", files["drive_pkg.vhd"])

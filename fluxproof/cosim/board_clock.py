@@ -5,7 +5,7 @@ The front ends' twins (golden_model/encoders, converters, io) and the clocked pa
 rtl/generated/fluxproof_board.vhd: what an instance reads from another is what that had registered before the clock.
 Registers are written by name; a write on the bus takes effect ``BUS`` clocks after its address and data were first
 valid, a setting then waits for the end of the sample in flight (io/register_access.vhd).  The trip pin, which acts
-without a clock, changes between two clocks here (io/power_stage.vhd).
+without a clock, changes between two clocks here; with a filter it is a pin like the others (io/power_stage.vhd).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from golden_model import clocked, fluxproof
+from golden_model.common import input_filter
 from golden_model.converters import current_front
 from golden_model.encoders import forced_position, position_front
 from golden_model.io import board_faults, board_map, board_snapshot, interrupts, sample_join
@@ -48,7 +49,7 @@ SEEN = (
 STATUS = tuple(board_map.STATUS)
 position_step, converter_step, forced_step = position_front.step, current_front.step, forced_position.step
 join_step, faults_step, snapshot_step = sample_join.step, board_faults.step, board_snapshot.step
-interrupts_step = interrupts.step
+interrupts_step, filter_step = interrupts.step, input_filter.step
 
 
 class Wires(NamedTuple):
@@ -96,6 +97,7 @@ class State(NamedTuple):
     of_faults: board_faults.State = board_faults.State()
     of_snapshot: board_snapshot.State = board_snapshot.State()
     of_interrupts: interrupts.State = interrupts.State()
+    of_filter: input_filter.State = input_filter.State()
     caught: int = 0  # of the trip pin
     trip_1: int = 0
     trip_2: int = 0
@@ -126,7 +128,7 @@ class BoardRegisters(NamedTuple):
 def one_clock(state, inputs, regs, b, pins, carrier_half, config):
     """One clock: (next state, whether a sample has entered, core, position, converters, board, snapshot, gates off)."""
     w, p, c = state.wires, pins, AT_CONVERTERS
-    encoder, currents, adc_bits, position_bits, lines = config
+    encoder, currents, adc_bits, position_bits, lines, trip_filter = config
     position, seen_position = position_step(
         state.of_position,
         position_front.Inputs(
@@ -217,8 +219,13 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
         irq=irq,
     )
     # The power stage: a trip is caught without a clock, and let go when the core has it
-    caught = 1 if p[AT_TRIP] or state.caught else 0
-    kept = 1 if p[AT_TRIP] or (caught and not state.trip_2) else 0
+    of_filter, trip_on, trip_next = state.of_filter, p[AT_TRIP], p[AT_TRIP]
+    if trip_filter:  # its level changes with the clock: the gates go off behind this edge
+        trip_on = state.of_filter.level
+        of_filter, (trip_next, _) = filter_step(state.of_filter, p[AT_TRIP], trip_filter)
+    caught = 1 if trip_on or state.caught else 0
+    kept = 1 if trip_on or trip_next or (caught and not state.trip_2) else 0
+    off = 1 if caught or trip_next else 0
     following = State(
         of_core=core,
         of_position=position,
@@ -228,13 +235,14 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
         of_faults=faults,
         of_snapshot=snapshot,
         of_interrupts=causes,
+        of_filter=of_filter,
         caught=kept,
         trip_1=caught,
         trip_2=state.trip_1,
         wires=wires,
     )
     board = (forced, board_flags, board_first)
-    return following, entered, seen_core, seen_position, seen_converters, board, seen_snapshot, caught
+    return following, entered, seen_core, seen_position, seen_converters, board, seen_snapshot, off
 
 
 @kernel
@@ -273,12 +281,16 @@ def run_clocks(state, inputs, regs, b, pins, carrier_half, config, until_idle, s
 class GoldenBlocks:
     """Which kind of front ends: the generics of fluxproof_board that the golden board needs."""
 
-    def __init__(self, config: fluxproof.Config, encoder: int = 1, currents: int = 1, spi_lines: int = 4):
+    def __init__(
+        self, config: fluxproof.Config, encoder: int = 1, currents: int = 1, spi_lines: int = 4, trip_filter: int = 0
+    ):
         self.core, self.encoder, self.currents, self.spi_lines = config, encoder, currents, spi_lines
+        self.trip_filter = trip_filter
 
     def generics(self, clock_hz: int) -> dict[str, int]:
         """By the names of the VHDL."""
         own = {"ENCODER": self.encoder, "CURRENTS": self.currents, "SPI_LINES": self.spi_lines}
+        own |= {"TRIP_FILTER": self.trip_filter}
         return {name.upper(): value for name, value in self.core._asdict().items()} | own | {"CLOCK_HZ": clock_hz}
 
 
@@ -293,6 +305,7 @@ class BoardClock:
         self.registers.at = {register.address: register for register in self.registers.map.values()}
         self.registers.reset()
         self.config = (blocks.encoder, blocks.currents, core.adc_bits, core.position_bits, blocks.spi_lines)
+        self.config += (blocks.trip_filter,)
         self.state, self.of_samples = State(), fluxproof.State()
         self.inputs = clocked.Inputs()
         self.clock = 0

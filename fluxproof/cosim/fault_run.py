@@ -31,17 +31,18 @@ WATCHED = ("fault_flags", "first_fault", "board_flags", "board_first", "irq_caus
 INDEX, LOST, OVER = 1, 2, 4  # bits of board_ignore
 CURRENT = PU.to_int(0.05)  # the voltage that a regulator without a motor asks for grows, and the duties with it
 HEARTBEAT = 3  # periods
+FILTERED = 3  # clocks: a pulse of so many at the pin trip has no effect where it is filtered
 
 
 def serial_and_modulators() -> Drive:
-    """An SSI encoder that never answers, and delta-sigma modulators; 480 clocks a period."""
+    """An SSI encoder that never answers, and delta-sigma modulators, the trip pin filtered; 480 clocks a period."""
     drive = with_carrier(load(DRIVES / "spindle_400v.toml"), 240)
     clock = drive.core.clock_hz
     return replace(
         drive,
         encoder=Encoder("ssi", bits=8, clock_hz=clock / 8, crc=False),
         converters=Converters("delta_sigma", clock_hz=clock / 4, oversampling=32, round_trip_s=2.0 / clock),
-        core=replace(drive.core, estimators=False),
+        core=replace(drive.core, estimators=False, trip_filter_s=FILTERED / clock),
     )
 
 
@@ -78,7 +79,7 @@ class FaultRun:
         self.drive, self.script, self.pins = drive, script, pins
         self.clock_hz = round(drive.core.clock_hz)
         config = registers(drive).config
-        self.blocks = GoldenBlocks(config, **board_generics(drive))
+        self.blocks = GoldenBlocks(config, trip_filter=drive.core.trip_filter_clocks, **board_generics(drive))
         self.golden = BoardClock(self.blocks, self.clock_hz)
         self.length = 2 * config.carrier_half
         ignored = REGISTERS["fault_ignore"].high & ~(1 << NAMES.index("trip") | 1 << NAMES.index("host_lost"))
@@ -200,7 +201,9 @@ def serial_run() -> FaultRun:
             if k in phases:
                 bits[100:300, phases[k]] = level
         inputs["mod_data"][:] = bits @ (1 << np.arange(4))
-        inputs["trip"][200:201] = k == 20 + HEARTBEAT + 11
+        at = 20 + HEARTBEAT + 9
+        inputs["trip"][200 : 200 + FILTERED] = at <= k < at + 2
+        inputs["trip"][220 : 221 + FILTERED] = k == at + 2
 
     return FaultRun(serial_and_modulators(), script, pins)
 

@@ -39,6 +39,7 @@ def generics(drive: Drive, register_set: RegisterSet, hil: bool = False) -> dict
     """The generics of the top, by their names in the VHDL."""
     chosen = board_generics(drive) if has_board(drive) or hil else {}
     levels = {name: getattr(drive.core, name) for name in ("ring_rows", "gate_active", "trip_active", "brake_active")}
+    levels["trip_filter"] = drive.core.trip_filter_clocks
     named = register_set.config._asdict() | levels | chosen
     return {"CLOCK_HZ": round(drive.core.clock_hz), **{name.upper(): value for name, value in named.items()}}
 

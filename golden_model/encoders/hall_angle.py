@@ -150,9 +150,13 @@ def stimuli(rng, config):
     uneven = [(int(2 ** rng.uniform(0, 9)), int(rng.choice([1, 1, 1, 1, -1, -1, 2]))) for _ in range(60)]
     rows += _turning(rng, 9000, uneven, still)
     rows += _turning(rng, 2000, [(int(rng.integers(1, 60)), (1, -1)[k & 1]) for k in range(40)], still)
+    rows += _turning(rng, 1000, [(30 + int(rng.integers(4)), (1, -1)[k & 1]) for k in range(30)], still)
+    # A reset between the edges leaves no sector time, however soon the next edge comes
+    rows += [still | {"step_up": int(k % 26 in (0, 12)), "sample": int(k % 26 == 5)} for k in range(700)]
     if longest < 5000:
-        for gap in (longest - 1, longest, longest + 1, longest + 40, longest // 4, longest // 4 + 2):
-            rows += _turning(rng, 20000, [(70, 1), (gap, 1), (longest // 2, 1), (gap, -1), (80, -1), (60, -1)], still)
+        for gap in (longest - 1, longest, longest + 1, longest // 4, longest // 4 + 2):
+            after = [(3 * longest // 4, 1), (gap, 1), (gap, -1)]  # a slow sector, and a slower one behind it
+            rows += _turning(rng, 20000, [(70, 1), (gap, 1), *after, (80, -1), (60, -1)], still)
     rows += [still | {"step_up": 1, "sample": 1}] * 3 + [still | {"sample": 1}] * 45
     return rows
 

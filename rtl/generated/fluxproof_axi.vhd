@@ -10,7 +10,8 @@
 -- a flip-flop that tools can copy; the one before it is near the pin.  While it lasts all gates are off; afterwards
 -- enable, every register and the memory of trips are at their reset values (all off).
 -- Formats: codes as the converters give them; registers as `fluxproof registers drive.toml` prints them.
--- Latency: sample_valid to duties FLUXPROOF_SAMPLE_TO_DUTY clocks; trip to gates off 0 clocks.
+-- Latency: sample_valid to duties FLUXPROOF_SAMPLE_TO_DUTY clocks; trip to gates off 0 clocks, with a
+-- TRIP_FILTER that many and 3.
 -- The file keeps to VHDL-93 so that a block design can also take it as a module.
 
 library ieee;
@@ -31,7 +32,8 @@ entity fluxproof_axi is
     RING_ROWS     : integer range 0 to 2730      := 0;  -- telemetry rows of the ring, 42 in a block RAM; 0 leaves it out
     GATE_ACTIVE   : integer range 0 to 1         := 1;  -- level of gate_high and gate_low at which a switch is on
     TRIP_ACTIVE   : integer range 0 to 1         := 1;  -- level of trip that turns the gates off
-    BRAKE_ACTIVE  : integer range 0 to 1         := 1  -- level of brake at which the resistor is on
+    BRAKE_ACTIVE  : integer range 0 to 1         := 1;  -- level of brake at which the resistor is on
+    TRIP_FILTER   : integer range 0 to 1023      := 0  -- longest pulse of trip without effect, clocks; 0: every pulse acts
   );
   port (
     aclk           : in  std_logic;  -- the one clock
@@ -66,7 +68,7 @@ entity fluxproof_axi is
     adc_c          : in  std_logic_vector(ADC_BITS - 1 downto 0);  -- ADC code, phase c
     adc_u_dc       : in  std_logic_vector(ADC_BITS - 1 downto 0);  -- ADC code, bus voltage
     position_code  : in  std_logic_vector(POSITION_BITS - 1 downto 0);  -- position code, one mechanical turn
-    trip           : in  std_logic;  -- asynchronous, TRIP_ACTIVE: gates off without a clock, remembered
+    trip           : in  std_logic;  -- asynchronous, TRIP_ACTIVE: gates off without a clock (see TRIP_FILTER), remembered
     gate_high      : out std_logic_vector(2 downto 0);  -- upper gates, bit 0 is leg a
     gate_low       : out std_logic_vector(2 downto 0);  -- lower gates, bit 0 is leg a
     brake          : out std_logic;  -- brake resistor on
@@ -341,7 +343,8 @@ begin
     generic map (
       GATE_ACTIVE  => GATE_ACTIVE,
       TRIP_ACTIVE  => TRIP_ACTIVE,
-      BRAKE_ACTIVE => BRAKE_ACTIVE
+      BRAKE_ACTIVE => BRAKE_ACTIVE,
+      TRIP_FILTER  => TRIP_FILTER
     )
     port map (
       clk            => aclk,

@@ -11,7 +11,8 @@
 -- Sample: the core's trigger latches the position and starts the converters; sample_join gives the sample to the core.
 -- Faults of the front ends trip the core (board_faults).  With ENCODER 1 to 3 and speed_given = 1 the speed is that
 -- between edges.
--- Formats: codes as the converters give them.  Latency: see docs/board.md; trip to gates off 0 clocks.
+-- Formats: codes as the converters give them.  Latency: see docs/board.md; trip to gates off 0 clocks, with a
+-- TRIP_FILTER that many and 3.
 -- The file keeps to VHDL-93 so that a block design can also take it as a module.
 
 library ieee;
@@ -33,6 +34,7 @@ entity fluxproof_board is
     GATE_ACTIVE   : integer range 0 to 1         := 1;  -- level of gate_high and gate_low at which a switch is on
     TRIP_ACTIVE   : integer range 0 to 1         := 1;  -- level of trip that turns the gates off
     BRAKE_ACTIVE  : integer range 0 to 1         := 1;  -- level of brake at which the resistor is on
+    TRIP_FILTER   : integer range 0 to 1023      := 0;  -- longest pulse of trip without effect, clocks; 0: every pulse acts
     ENCODER       : integer range 0 to 6         := 1;  -- the kind of encoder, see above
     CURRENTS      : integer range 0 to 3         := 1;  -- the kind of converter, see above
     SPI_LINES     : integer range 1 to 4         := 4  -- data lines of the SPI converters
@@ -93,7 +95,7 @@ entity fluxproof_board is
     code_b_in      : in  std_logic_vector(ADC_BITS - 1 downto 0);
     code_c_in      : in  std_logic_vector(ADC_BITS - 1 downto 0);
     code_u_dc_in   : in  std_logic_vector(ADC_BITS - 1 downto 0);
-    trip           : in  std_logic;  -- asynchronous, TRIP_ACTIVE: gates off without a clock, remembered
+    trip           : in  std_logic;  -- asynchronous, TRIP_ACTIVE: gates off without a clock (see TRIP_FILTER), remembered
     gate_high      : out std_logic_vector(2 downto 0);  -- upper gates, bit 0 is leg a
     gate_low       : out std_logic_vector(2 downto 0);  -- lower gates, bit 0 is leg a
     brake          : out std_logic;  -- brake resistor on
@@ -573,7 +575,8 @@ begin
     generic map (
       GATE_ACTIVE  => GATE_ACTIVE,
       TRIP_ACTIVE  => TRIP_ACTIVE,
-      BRAKE_ACTIVE => BRAKE_ACTIVE
+      BRAKE_ACTIVE => BRAKE_ACTIVE,
+      TRIP_FILTER  => TRIP_FILTER
     )
     port map (
       clk            => aclk,

@@ -6,10 +6,13 @@
 -- an edge of clk, when the core's own gates are already off; the core's trip latch keeps them off.
 -- This is the only asynchronous set or clear; scripts/vivado/fluxproof.xdc contains its timing exception.
 -- Gates and sample_trigger leave together, one register behind gate_generation, so that the registers fit in IO cells.
+-- TRIP_FILTER = 0: as above.  Else the pin first passes input_filter, and only a level that has been there for more
+-- than TRIP_FILTER clocks is a trip: for a comparator that is disturbed by the switching it watches.  The gates stay on
+-- meanwhile, since to blank them at once would answer each disturbance by another edge; and a stopped clk trips no more.
 -- The generics say at which level a pin is active.  The gates' registers hold the level of the pin itself: an FPGA starts
 -- them with it, so the gates are off from the end of configuration on.  TRIP_ACTIVE = 0 with a pull-down trips where the
 -- wire is broken.
--- Latency: gates 1, brake 0; trip_pin to gates off 0, to trip 2.  Formats: bits.  Rounding: none.
+-- Latency: gates 1, brake 0; trip_pin to gates off 0, to trip 2; with a filter TRIP_FILTER + 3 and 5.  Formats: bits.  Rounding: none.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -19,7 +22,8 @@ entity power_stage is
   generic (
     GATE_ACTIVE  : integer := 1;  -- level of a gate pin at which the switch is on
     TRIP_ACTIVE  : integer := 1;  -- level of the trip pin that turns the gates off
-    BRAKE_ACTIVE : integer := 1  -- level of the brake pin at which the resistor is on
+    BRAKE_ACTIVE : integer := 1;  -- level of the brake pin at which the resistor is on
+    TRIP_FILTER  : integer := 0  -- longest pulse of the trip pin without effect, clocks; 0: none, every pulse acts
   );
   port (
     clk            : in  std_logic;
@@ -52,6 +56,7 @@ architecture rtl of power_stage is
 
   -- An FPGA initialises a register with a set to 1 and the others to 0: the gates are off before the first clock.
   signal caught  : std_logic;
+  signal pin_on  : std_logic;
   signal trip_on : std_logic;
   signal sync_1  : std_logic;
   signal sync_2  : std_logic;
@@ -60,8 +65,19 @@ architecture rtl of power_stage is
   attribute async_reg of sync_2 : signal is "TRUE";
 begin
 
-  trip_on <= trip_pin xor not level(TRIP_ACTIVE);
-  brake   <= brake_next xor not level(BRAKE_ACTIVE);
+  pin_on <= trip_pin xor not level(TRIP_ACTIVE);
+  brake  <= brake_next xor not level(BRAKE_ACTIVE);
+
+  direct : if TRIP_FILTER = 0 generate
+    trip_on <= pin_on;
+  end generate;
+
+  filtered : if TRIP_FILTER > 0 generate
+    filter : entity work.input_filter
+      port map (
+        clk => clk, rst => rst, pin => pin_on, filter_clocks => to_unsigned(TRIP_FILTER, 10), level => trip_on,
+        settled => open);
+  end generate;
 
   catching : process (clk, trip_on)
   begin

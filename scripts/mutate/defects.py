@@ -46,6 +46,8 @@ DEFECTS = (
     Defect("old values read after reset", "generated/register_file.vhd", "        written                   <= (others => '0');\n", ""),
     Defect("short trip forgotten", "io/power_stage.vhd", "    if trip_on = '1' then", "    if trip_on = '1' and rising_edge(clk) then"),
     Defect("gates let go before the core knows", "io/power_stage.vhd", "if sync_2 = '1' or rst = '1' then", "if sync_1 = '1' or rst = '1' then"),
+    Defect("filtered trip acts a clock late", "io/power_stage.vhd", "to_unsigned(TRIP_FILTER, 10)", "to_unsigned(TRIP_FILTER + 1, 10)"),
+    Defect("trip filter left out", "io/power_stage.vhd", "pin => pin_on, filter_clocks => to_unsigned(TRIP_FILTER, 10)", "pin => pin_on, filter_clocks => to_unsigned(0, 10)"),
     Defect("trip kept for ever", "io/power_stage.vhd", "if sync_2 = '1' or rst = '1' then", "if rst = '1' then"),
     Defect("one synchroniser stage", "io/power_stage.vhd", "trip <= sync_2;", "trip <= sync_1;"),
     Defect("upper and lower gates swapped", "generated/fluxproof_axi.vhd", "gate_high_next => gate_high_next,", "gate_high_next => gate_low_next,"),

@@ -54,6 +54,7 @@ GENERICS = {
     "GATE_ACTIVE": ("integer range 0 to 1", 1, "level of gate_high and gate_low at which a switch is on"),
     "TRIP_ACTIVE": ("integer range 0 to 1", 1, "level of trip that turns the gates off"),
     "BRAKE_ACTIVE": ("integer range 0 to 1", 1, "level of brake at which the resistor is on"),
+    "TRIP_FILTER": ("integer range 0 to 1023", 0, "longest pulse of trip without effect, clocks; 0: every pulse acts"),
 }
 # The telemetry's queue, of which 512 words are one block RAM; its counters and the ring's rows, which only a bench
 # makes smaller
@@ -93,7 +94,7 @@ PINS = (
     ("adc_c", "in", CODE, "ADC code, phase c"),
     ("adc_u_dc", "in", CODE, "ADC code, bus voltage"),
     ("position_code", "in", POSITION, "position code, one mechanical turn"),
-    ("trip", "in", None, "asynchronous, TRIP_ACTIVE: gates off without a clock, remembered"),
+    ("trip", "in", None, "asynchronous, TRIP_ACTIVE: gates off without a clock (see TRIP_FILTER), remembered"),
     ("gate_high", "out", "2 downto 0", "upper gates, bit 0 is leg a"),
     ("gate_low", "out", "2 downto 0", "lower gates, bit 0 is leg a"),
     ("brake", "out", None, "brake resistor on"),
@@ -118,7 +119,8 @@ HEADER = """\
 -- a flip-flop that tools can copy; the one before it is near the pin.  While it lasts all gates are off; afterwards
 -- enable, every register and the memory of trips are at their reset values (all off).
 -- Formats: codes as the converters give them; registers as `fluxproof registers drive.toml` prints them.
--- Latency: sample_valid to duties FLUXPROOF_SAMPLE_TO_DUTY clocks; trip to gates off 0 clocks.
+-- Latency: sample_valid to duties FLUXPROOF_SAMPLE_TO_DUTY clocks; trip to gates off 0 clocks, with a
+-- TRIP_FILTER that many and 3.
 -- The file keeps to VHDL-93 so that a block design can also take it as a module."""
 
 

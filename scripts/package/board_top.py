@@ -20,7 +20,8 @@ HEADER = """\
 -- Sample: the core's trigger latches the position and starts the converters; sample_join gives the sample to the core.
 -- Faults of the front ends trip the core (board_faults).  With ENCODER 1 to 3 and speed_given = 1 the speed is that
 -- between edges.
--- Formats: codes as the converters give them.  Latency: see docs/board.md; trip to gates off 0 clocks.
+-- Formats: codes as the converters give them.  Latency: see docs/board.md; trip to gates off 0 clocks, with a
+-- TRIP_FILTER that many and 3.
 -- The file keeps to VHDL-93 so that a block design can also take it as a module."""
 
 # Of fluxproof_axi's pins: what the front ends give here

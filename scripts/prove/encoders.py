@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Properties of the encoder inputs: filter, decoder, counter within a turn."""
+"""Properties of the encoder inputs: filter, decoder, counter within a turn, time over whole lines, Hall angle."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from scripts.prove.proof import Fault, Proof, committed
 FILTER = "common/input_filter.vhd"
 DECODER = "encoders/quadrature_decoder.vhd"
 COUNTER = "encoders/turn_counter.vhd"
+HALL = "encoders/hall_angle.vhd"
+LINES = "encoders/line_timer.vhd"
 
 
 def proof(name: str, says: str, entity: str, macros: tuple[str, ...], *faults: Fault, **more) -> Proof:
@@ -75,5 +77,50 @@ PROOFS = (
         Fault("sample hides a step", COUNTER, "up      <= step_up or (mend",
               "up      <= (step_up and not sample) or (mend"),
         assumed="counts, code_step and code_rest possible and constant",
+    ),
+    proof(
+        "line_known",
+        "a span is known only where the shaft has turned a whole line in one direction since the last rest",
+        "line_timer",
+        ("KNOWN",),
+        Fault("a reversal keeps the stamps", LINES, "known      := state.known and not (still or turned)",
+              "known      := state.known and not still"),
+        Fault("a rest keeps the window's stamp", LINES, "base_known := state.base_known and not (still or turned)",
+              "base_known := state.base_known and not turned"),
+        Fault("the next line always known", LINES, "<= known(to_integer(following))", "<= '1'"),
+        method="pdr",
+        generics={"TIME_W": 4},
+        assumed="no step in both directions at once",
+    ),
+    proof(
+        "line_span",
+        "line_span is from the last edge of this kind before the window to this one, next_span from a line before the "
+        "next one; known where the run holds them, and only there",
+        "line_timer",
+        ("SPANS",),
+        Fault("an edge with take is of the old window", LINES, "state.fresh(to_integer(kind)) or take",
+              "state.fresh(to_integer(kind))"),
+        Fault("a reversal passes a new edge", LINES, "(edge and state.seen and not turned) = '0'",
+              "(edge and state.seen) = '0'"),
+        Fault("the line of the next edge but one", LINES, "last(to_integer(following))",
+              "last(to_integer(following + 1))"),
+        method="bmc",
+        depth=12,
+        generics={"TIME_W": 4},
+        assumed="no step in both directions at once; times of 6 bits",
+        patience=240,
+    ),
+    proof(
+        "hall_within",
+        "the angle is within the sector of its sample, and its middle where no edge came since a skipped sector",
+        "hall_angle",
+        (),
+        Fault("from the middle on", HALL, "-HALF_SECTOR when within = '1' else", "HALF_SECTOR when within = '1' else"),
+        Fault("a skipped sector forgotten", HALL, "        seen <= '0';\n      elsif", "        null;\n      elsif"),
+        Fault("the middle of now", HALL, "theta <= begin_at +", "theta <= middle +"),
+        spies=("clock", "part", "place", "begin_at", "middle", "seen"),
+        search_generics={"TIME_W": 4},
+        search_depth=32,
+        patience=120,
     ),
 )  # fmt: skip

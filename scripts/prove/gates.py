@@ -8,6 +8,7 @@ from scripts.prove.proof import Fault, Proof, committed
 
 GATES = "modulation/gate_generation.vhd"
 COMPARE = "modulation/pwm_compare.vhd"
+BOOTSTRAP = "modulation/bootstrap_charge.vhd"
 SPIES = ("state",)
 FULL = {"CARRIER_HALF": 10000}  # 200 MHz, 10 kHz: the default of the core
 SMALL = {"CARRIER_HALF": 8}  # a period of 16 clocks, so that a search sees several
@@ -44,6 +45,19 @@ def compare_proof(name: str, says: str, macro: str, *faults: Fault, method: str 
         macros=(macro, f"LATENCY={block.latency}", f"INTERVAL={block.interval}"),
         assumed="duties from 0 to 1, samples at their distance, settings constant while a sample is in flight",
         search_depth=3 * block.latency,
+    )
+
+
+def charge_proof(name: str, says: str, macro: str, *faults: Fault, **more) -> Proof:
+    return Proof(
+        name=f"bootstrap_{name}",
+        says=says,
+        entity="bootstrap_charge",
+        harness=committed("bootstrap_charge.sv"),
+        faults=faults,
+        macros=(macro,),
+        method="pdr",
+        **more,
     )
 
 
@@ -203,5 +217,32 @@ PROOFS = (
             "        kept_a_5 <= dropped_4;",
             "        kept_a_5 <= dropped_4;\n        compare_a <= dropped_4;",
         ),
+    ),
+    charge_proof(
+        "exact",
+        "the lower switches charge for charge_samples sample times after the gates went on, the drive runs one later",
+        "EXACT",
+        Fault(
+            "a sample time too early",
+            BOOTSTRAP,
+            "if count >= charge_samples then",
+            "if count + 1 >= charge_samples then",
+        ),
+        Fault("a pause of the gates forgotten", BOOTSTRAP, "        count := (others => '0');", "        null;"),
+        assumed="charge_samples below 12 and constant",
+        search_depth=40,
+    ),
+    charge_proof(
+        "stays",
+        "never charging and charged; no charging in a drive that runs, whatever is written; not charged with gates off",
+        "STAYS",
+        Fault(
+            "a longer time stops the drive",
+            BOOTSTRAP,
+            "done or (nor charge_samples)",
+            "nor charge_samples when count < charge_samples else done",
+        ),
+        Fault("the running drive charges", BOOTSTRAP, "charging <= not done;", "charging <= '1';"),
+        Fault("charged for ever", BOOTSTRAP, "        done  := '0';\n      elsif", "        null;\n      elsif"),
     ),
 )

@@ -3,8 +3,9 @@
 # NAME is the name from the top of the whole design on, hence the leading *.  A front end that is not built has no such
 # register: Vivado warns that nothing was found, and scripts/vivado/board_pins.tcl counts what each line finds.
 
-# The trip pin sets this register without a clock; see fluxproof.xdc.
+# The trip pin sets this register without a clock, or enters the filter of TRIP_FILTER; see fluxproof.xdc.
 set_false_path -to [get_pins stage/caught_reg/PRE]
+set_false_path -to [get_pins -hierarchical -filter {NAME =~ *stage/*/sync_1_reg/D}]
 
 # Pins of encoders, BUSY and the modulators' own clock: no edge to be in time for.  Each passes two registers with
 # ASYNC_REG and a filter or a detection of edges.

@@ -34,7 +34,7 @@ class RoughBoard:
     def __init__(self, drive: Drive, theta_m: float = 0.0, omega_m: float = 0.0):
         self.drive, self.clock_hz = drive, round(drive.core.clock_hz)
         self.set = registers(drive)
-        blocks = GoldenBlocks(self.set.config, **board_generics(drive))
+        blocks = GoldenBlocks(self.set.config, trip_filter=drive.core.trip_filter_clocks, **board_generics(drive))
         self.golden = BoardClock(blocks, self.clock_hz)
         self.plant, sensors = build_plant(drive, omega_m=omega_m)
         self.codes, self.place = sensor_params(sensors), theta_m  # of the encoder at the plant's zero [mechanical rad]

@@ -68,7 +68,9 @@ class BoardLoop:
         self.drive, self.start_angle, self.writes = drive, theta_m, writes
         self.clock_hz = round(drive.core.clock_hz)
         self.registers = registers(drive)
-        self.blocks = GoldenBlocks(self.registers.config, **board_generics(drive))
+        self.blocks = GoldenBlocks(
+            self.registers.config, trip_filter=drive.core.trip_filter_clocks, **board_generics(drive)
+        )
         self.golden = BoardClock(self.blocks, self.clock_hz)
         self.plant, sensors = build_plant(drive, omega_m=omega_m)
         self.codes = sensor_params(sensors)

@@ -76,7 +76,7 @@ array set known {
   set_max_delay         {{-datapath_only 0 -from 1 -to 1} 1 1}
   get_cells             {{-hierarchical 0 -filter 1} 0 1}
   create_clock          {{-name 1 -period 1} 1 1}
-  set_false_path        {{-from 1 -to 1} 0 0}
+  set_false_path        {{-quiet 0 -from 1 -to 1} 0 0}
   set_input_delay       {{-clock 1} 2 2}
   set_output_delay      {{-clock 1} 2 2}
 }
@@ -285,7 +285,7 @@ proc do_all_fanin {options pins} {
   return ports
 }
 proc do_set_false_path {options} {
-  if {[dict exists $options -to] && [dict get $options -to] eq ""} {
+  if {[dict exists $options -to] && [dict get $options -to] eq "" && ![dict exists $options -quiet]} {
     error "set_false_path: no object for -to"
   }
 }
