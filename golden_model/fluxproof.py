@@ -128,6 +128,7 @@ WIRING = {
 EARLY = {
     ("stator_frame", "conditioning"): 1,
     ("rotor_frame", "stator_frame"): 1,
+    ("trajectory", "position_regulator"): position_trajectory.LATE,
     ("bus_reciprocal", "bus_voltage"): u_dc_conditioning.AHEAD,
     ("period_voltage", "bus_voltage"): u_dc_conditioning.AHEAD,
     ("checks", "bus_voltage"): u_dc_conditioning.AHEAD,

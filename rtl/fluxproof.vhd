@@ -208,7 +208,6 @@ begin
               out_valid => circle_valid, i_d_limited => i_d_limited, i_q_max => i_q_max);
 
   by_position : if POSITION_LOOP = 1 generate
-    signal position_valid : std_logic;
     signal position_ref   : signed(o.shaft_position'range);
     signal omega_ff       : signed(INTEGRAL_W - 1 downto 0);
     signal at_rest        : std_logic;
@@ -221,11 +220,11 @@ begin
                 reverse => settings.reverse, position_restart => settings.position_restart,
                 position_mode => settings.position_mode, position_kp => settings.position_kp,
                 position_band => settings.position_band, omega_most => settings.omega_most,
-                out_valid => position_valid, shaft_position => o.shaft_position, position_error => o.position_error,
+                out_valid => open, shaft_position => o.shaft_position, position_error => o.position_error,
                 omega_asked => omega_asked, regulates => regulates);
 
     trajectory : entity work.position_trajectory
-      port map (clk => clk, rst => rst, in_valid => position_valid,
+      port map (clk => clk, rst => rst, in_valid => latch_valid,
                 shaft_position => o.shaft_position, run => run,
                 position_mode => settings.position_mode, position_target => settings.position_target,
                 move_speed => settings.move_speed, move_step => settings.move_step, jerk_bits => settings.jerk_bits,
