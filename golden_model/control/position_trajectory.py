@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 from golden_model.block import Block, Port
 from golden_model.control.position_control import POSITION, POSITION_W
-from golden_model.control.position_plan import BUSY_W, SECTION_BITS, SMALL, WAY, WAY_W, Plan, planned
+from golden_model.control.position_plan import BUSY_W, SECTION_BITS, SMALL, SPEED_UP, WAY, WAY_W, Plan, planned
 from golden_model.fixed import Format, clamp, saturate, wrap_s
 from golden_model.formats import BIT, INTEGRAL, INTEGRAL_W, PU, PU_W
 from golden_model.io.speed import K_FILTER, K_SPEED
@@ -236,6 +236,7 @@ BLOCK = Block(
         "SMALL": SMALL,
         "BUSY_W": BUSY_W,
         "DROP": DROP,
+        "SPEED_UP": SPEED_UP,
         "LOW": LOW,
         "TO_PU": TO_PU,
         "TO_INTEGRAL": TO_INTEGRAL,

@@ -36,21 +36,27 @@ package position_program_pkg is
   constant NOWHERE     : natural := 31;
 
   -- What x is
-  constant X_SHAFT : natural := 0;
-  constant X_PICKED : natural := 1;  -- the target, or the stop that is nearer
-  constant X_LOW : natural := 2;
-  constant X_HIGH : natural := 3;
+  constant X_SHAFT   : natural := 0;
+  constant X_PICKED  : natural := 1;  -- the target, or the stop that is nearer
+  constant X_LOW     : natural := 2;
+  constant X_HIGH    : natural := 3;
   constant X_PRODUCT : natural := 4;
-  constant X_SPEED : natural := 5;
-  constant X_STEP : natural := 6;
+  constant X_SPEED   : natural := 5;
+  constant X_STEP    : natural := 6;
   constant X_COULOMB : natural := 7;
 
-  type operation_t is (KEEP, ADD, LEFT_3, RIGHT_3, RIGHT_2);
+  -- What a factor, v, a or the filter's error, is multiplied by
+  constant BY_INERTIA : natural := 0;
+  constant BY_VISCOUS : natural := 1;
+  constant BY_SPEED   : natural := 2;
+  constant BY_FILTER  : natural := 3;
+
+  type operation_t is (ADD, LEFT_3, RIGHT_3, RIGHT_2);
   type source_t is (FROM_MEMORY, FROM_X, FROM_WAY);
   type sign_t is (PLUS, MINUS, IF_DOWN, IF_NEGATIVE_V, IF_SLOWER);
   type condition_t is (ALWAYS, AT_LEAD, ACTIVE, STILL, FOLLOWS, NEGATIVE, NOT_NEGATIVE, MOVING, FASTER, SLOWER, CHANGES,
                        GOES, RESTS);
-  type event_t is (NOTHING, BY_INERTIA, BY_VISCOUS, BY_SPEED, BY_FILTER, UPPER_HALF, SIGN_OF_V, POSITION_OUT,
+  type event_t is (NOTHING, LOWER_HALF, UPPER_HALF, SIGN_OF_V, POSITION_OUT,
                    TORQUE_OUT, OMEGA_OUT, PICK_HIGH, PICK_LOW, SETTINGS, TURN, SPEED_FITS, FASTER_FITS, WAY_FITS,
                    FASTER_WAY_FITS, SPEED_ZERO, PROFILE);
 
@@ -60,6 +66,8 @@ package position_program_pkg is
     m      : unsigned(4 downto 0);
     sign   : sign_t;
     put    : unsigned(4 downto 0);
+    puts   : std_logic;
+    acts   : std_logic;  -- acc changes
     only   : condition_t;
     does   : event_t;
     clears : std_logic;
@@ -68,7 +76,7 @@ package position_program_pkg is
   end record word_t;
   type program_t is array (0 to 127) of word_t;
 
-  constant NO_WORD : word_t := (KEEP, FROM_MEMORY, (others => '0'), PLUS, (others => '1'), ALWAYS, NOTHING, '0', '0', '0');
+  constant NO_WORD : word_t := (ADD, FROM_MEMORY, (others => '0'), PLUS, (others => '1'), '0', '0', ALWAYS, NOTHING, '0', '0', '0');
 
   -- Where the program of a sample begins, and the part of the plan that each sample of eight runs behind it
   type begins_t is array (0 to 8) of unsigned(6 downto 0);
@@ -95,7 +103,10 @@ package body position_program_pkg is
                  does : event_t; last : natural) return word_t is
     variable word : word_t := NO_WORD;
   begin
-    word := (op, from, to_unsigned(m, 5), sign, to_unsigned(put, 5), only, does, '0', '0', '0');
+    word := (op, from, to_unsigned(m, 5), sign, to_unsigned(put, 5), '0', '1', only, does, '0', '0', '0');
+    if put /= NOWHERE then
+      word.puts := '1';
+    end if;
     if last > 0 then
       word.clears := '1';
     end if;
@@ -127,18 +138,27 @@ package body position_program_pkg is
   end function;
 
   function keeps (put : natural := NOWHERE; does : event_t := NOTHING; only : condition_t := ALWAYS) return word_t is
+    variable word : word_t := made(ADD, FROM_MEMORY, 0, PLUS, put, only, does, 0);
   begin
-    return made(KEEP, FROM_MEMORY, 0, PLUS, put, only, does, 0);
+    word.acts := '0';
+    return word;
+  end function;
+
+  function multiplies (x : natural; put : natural := NOWHERE) return word_t is
+    variable word : word_t := keeps(put, LOWER_HALF);
+  begin
+    word.m := to_unsigned(x, 5);
+    return word;
   end function;
 
   function clear (put : natural := NOWHERE; does : event_t := NOTHING; only : condition_t := ALWAYS) return word_t is
   begin
-    return made(KEEP, FROM_MEMORY, 0, PLUS, put, only, does, 1);
+    return made(ADD, FROM_MEMORY, 0, PLUS, put, only, does, 1);
   end function;
 
   function finish (put : natural := NOWHERE; does : event_t := NOTHING; only : condition_t := ALWAYS) return word_t is
   begin
-    return made(KEEP, FROM_MEMORY, 0, PLUS, put, only, does, 2);
+    return made(ADD, FROM_MEMORY, 0, PLUS, put, only, does, 2);
   end function;
 
   function shift (op : operation_t) return word_t is
@@ -159,7 +179,7 @@ package body position_program_pkg is
       -- a += change;  v += a;  the late ones;  way += late_v
       0  => plus_m(CHANGE),
       1  => plus_m(A, put => LATE_CHANGE, only => AT_LEAD),
-      2  => keeps(A, BY_INERTIA),
+      2  => multiplies(BY_INERTIA, A),
       3  => plus_m(V, does => UPPER_HALF),
       4  => clear(V, SIGN_OF_V),
       5  => plus_m(LATE_CHANGE),
@@ -175,7 +195,7 @@ package body position_program_pkg is
       14 to 17 => shift(LEFT_3),
       18 => clear(TORQUE),
       19 => plus_m(V),
-      20 => keeps(does => BY_VISCOUS),
+      20 => multiplies(BY_VISCOUS),
       21 => clear(does => UPPER_HALF),
       22 => plus_m(TORQUE),
       23 => plus_x(X_PRODUCT),
@@ -183,13 +203,13 @@ package body position_program_pkg is
       25 => clear(does => TORQUE_OUT),
       -- omega_ff += k_filter*(k_speed*late_v - omega_ff)
       26 => plus_m(LATE_V),
-      27 => keeps(does => BY_SPEED),
+      27 => multiplies(BY_SPEED),
       28 => clear(does => UPPER_HALF),
       29 => keeps,
       30 => plus_x(X_PRODUCT),
       31 => shift(LEFT_3),
       32 => minus_m(OMEGA),
-      33 => keeps(does => BY_FILTER),
+      33 => multiplies(BY_FILTER),
       34 => clear(does => UPPER_HALF),
       35 => plus_m(OMEGA),
       36 => plus_x(X_PRODUCT),

@@ -50,13 +50,14 @@ entity position_trajectory is
 end entity position_trajectory;
 
 architecture rtl of position_trajectory is
-  constant LATENCY : positive := POSITION_TRAJECTORY_LATENCY;
-  constant WAY_W   : positive := POSITION_TRAJECTORY_WAY_W;
-  constant SMALL   : positive := POSITION_TRAJECTORY_SMALL;
-  constant DROP    : positive := POSITION_TRAJECTORY_DROP;
-  constant HALF_W  : positive := POSITION_TRAJECTORY_LOW;  -- bits of a factor's lower half
-  constant TO_PU   : positive := POSITION_TRAJECTORY_TO_PU;
-  constant TO_INT  : positive := POSITION_TRAJECTORY_TO_INTEGRAL;
+  constant LATENCY  : positive := POSITION_TRAJECTORY_LATENCY;
+  constant WAY_W    : positive := POSITION_TRAJECTORY_WAY_W;
+  constant SMALL    : positive := POSITION_TRAJECTORY_SMALL;
+  constant DROP     : positive := POSITION_TRAJECTORY_DROP;
+  constant HALF_W   : positive := POSITION_TRAJECTORY_LOW;  -- bits of a factor's lower half
+  constant SPEED_UP : positive := POSITION_TRAJECTORY_SPEED_UP;
+  constant TO_PU    : positive := POSITION_TRAJECTORY_TO_PU;
+  constant TO_INT   : positive := POSITION_TRAJECTORY_TO_INTEGRAL;
   constant WORDS    : program_t := program;
   constant BEGIN_AT : begins_t  := begins(WORDS);
 
@@ -83,21 +84,21 @@ architecture rtl of position_trajectory is
   signal bits  : unsigned(2 downto 0);
   signal lead  : unsigned(2 downto 0);
 
-  signal memory  : memory_t;
-  signal written : std_logic_vector(15 downto 0);
-  signal acc     : acc_t;
-  signal below   : std_logic;  -- acc < 0, with the bit that acc lacks
-  signal met     : std_logic;
-  signal puts    : std_logic;
-  signal x       : acc_t;
-  signal which   : unsigned(2 downto 0);
-  signal picked  : unsigned(2 downto 0);
+  signal memory    : memory_t;
+  signal written   : std_logic_vector(15 downto 0);
+  signal acc       : acc_t;
+  signal below     : std_logic;  -- acc < 0, with the bit that acc lacks
+  signal met       : std_logic;
+  signal puts      : std_logic;
+  signal moves_acc : std_logic;  -- the word changes acc
+  signal x         : acc_t;
+  signal which     : unsigned(2 downto 0);
+  signal picked    : unsigned(2 downto 0);
 
   signal factor_x : signed(24 downto 0);
   signal factor_y : signed(17 downto 0);
   signal of_error : std_logic;
   signal goes_on  : std_logic;
-  signal upper    : std_logic;
   signal p        : signed(42 downto 0);
   signal narrow   : signed(INTEGRAL_W - 1 downto 0);
 
@@ -143,26 +144,27 @@ begin
     goes_speed                   when GOES,
     not (goes_speed or held)     when RESTS,
     '1'                          when others;
-  puts <= met when word.put /= NOWHERE else '0';
+  puts      <= word.puts and met;
+  moves_acc <= word.acts and (met or word.puts);
 
   which <= picked when word.m(2 downto 0) = X_PICKED else word.m(2 downto 0);
   with to_integer(which) select x <=
-    turns_of(shaft_position)                                    when X_SHAFT,
-    turns_of(position_target)                                   when X_PICKED,
-    turns_of(stop_low)                                          when X_LOW,
-    turns_of(stop_high)                                         when X_HIGH,
-    resize(p, WAY_W)                                            when X_PRODUCT,
-    signed(shift_left(resize(move_speed, WAY_W), DROP + 1))     when X_SPEED,
-    signed(resize(move_step, WAY_W))                            when X_STEP,
-    shift_left(resize(coulomb, WAY_W), TO_PU)                   when others;
+    turns_of(shaft_position)                                 when X_SHAFT,
+    turns_of(position_target)                                when X_PICKED,
+    turns_of(stop_low)                                       when X_LOW,
+    turns_of(stop_high)                                      when X_HIGH,
+    resize(p, WAY_W)                                         when X_PRODUCT,
+    signed(shift_left(resize(move_speed, WAY_W), SPEED_UP))  when X_SPEED,
+    signed(resize(move_step, WAY_W))                         when X_STEP,
+    shift_left(resize(coulomb, WAY_W), TO_PU)                when others;
 
   narrow <= saturate(acc(WAY_W - 1 downto TO_INT), INTEGRAL_W);
 
   process (clk)
     variable takes_x : std_logic;
-    variable less  : std_logic;
+    variable less    : std_logic;
     variable b      : acc_t;
-    variable sum    : signed(WAY_W downto 0);
+    variable sum    : signed(WAY_W + 1 downto 0);
     variable does   : event_t;
   begin
     if rising_edge(clk) then
@@ -218,20 +220,20 @@ begin
         b := x;
       end if;
       b   := b xor (b'range => less);
-      sum := resize(acc, WAY_W + 1) + resize(b, WAY_W + 1) + signed'('0' & less);
-      if met = '1' or word.put /= NOWHERE then
+      sum := (resize(acc, WAY_W + 1) & '1') + (resize(b, WAY_W + 1) & less);  -- the last bit carries in
+      if moves_acc = '1' then
         case word.op is
-          when ADD     => acc <= sum(WAY_W - 1 downto 0);
-                          below <= sum(WAY_W);
           when LEFT_3  => acc <= shift_left(acc, 3);
           when RIGHT_3 => acc <= shift_right(acc, 3);
           when RIGHT_2 => acc <= shift_right(acc, 2);
-          when KEEP    => null;
+          when ADD     =>
+            acc   <= sum(WAY_W downto 1);
+            below <= sum(WAY_W + 1);
         end case;
-        if word.clears = '1' then
-          acc   <= (others => '0');
-          below <= '0';
-        end if;
+      end if;
+      if rst = '1' or (moves_acc and word.clears) = '1' then
+        acc   <= (others => '0');
+        below <= '0';
       end if;
       if puts = '1' then
         memory(to_integer(word.put)) <= acc;
@@ -241,35 +243,30 @@ begin
       end if;
 
       -- The multiplier: the lower half, then the upper one and the lower product
-      goes_on <= '0';
       does    := word.does;
-      if does = BY_INERTIA or does = BY_VISCOUS or does = BY_SPEED or does = BY_FILTER then
+      goes_on <= '0';
+      if goes_on = '1' then
+        p <= factor_x * factor_y + shift_right(p, HALF_W);
+      end if;
+      if does = LOWER_HALF then
+        p        <= (others => '0');
+        goes_on  <= '1';
+        of_error <= word.m(0) and word.m(1);
         factor_y <= signed('0' & acc(DROP + HALF_W - 1 downto DROP));
-        of_error <= '0';
-        if does = BY_FILTER then
+        if word.m(1 downto 0) = BY_FILTER then
           factor_y <= signed('0' & acc(HALF_W - 1 downto 0));
-          of_error <= '1';
         end if;
-        case does is
+        case to_integer(word.m(1 downto 0)) is
           when BY_INERTIA => factor_x <= signed('0' & k_inertia);
           when BY_VISCOUS => factor_x <= signed('0' & k_viscous);
           when BY_SPEED   => factor_x <= signed('0' & k_speed);
           when others     => factor_x <= signed(resize(k_filter & '0', 25));
         end case;
-        upper   <= '0';
-        goes_on <= '1';
       elsif does = UPPER_HALF then
+        goes_on  <= '1';
         factor_y <= acc(DROP + HALF_W + 17 downto DROP + HALF_W);
         if of_error = '1' then
           factor_y <= narrow(INTEGRAL_W - 1 downto INTEGRAL_W - 18);
-        end if;
-        upper   <= '1';
-        goes_on <= '1';
-      end if;
-      if goes_on = '1' then
-        p <= factor_x * factor_y;
-        if upper = '1' then
-          p <= factor_x * factor_y + shift_right(p, HALF_W);
         end if;
       end if;
 
@@ -277,13 +274,15 @@ begin
         when SIGN_OF_V =>
           v_below <= below;
           moves   <= '1' when acc /= 0 else '0';
-        when POSITION_OUT => position_ref <= acc(WAY_W - 1 downto SMALL);
+        when POSITION_OUT =>
+          position_ref <= acc(WAY_W - 1 downto SMALL);
         when TORQUE_OUT =>
           torque_ff <= narrow(INTEGRAL_W - 1 downto INTEGRAL_W - PU_W);
           if is_active = '0' then
             torque_ff <= (others => '0');
           end if;
-        when OMEGA_OUT => omega_ff <= narrow;
+        when OMEGA_OUT =>
+          omega_ff <= narrow;
         when PICK_HIGH =>
           if use_stops = '1' and below = '0' then
             picked <= to_unsigned(X_HIGH, 3);
@@ -306,8 +305,8 @@ begin
         when FASTER_FITS     => fits_faster  <= not below;
         when WAY_FITS        => fits_way     <= not below;
         when FASTER_WAY_FITS => fits_further <= not below;
-        when SPEED_ZERO => stands <= '1' when acc = 0 else '0';
-        when PROFILE         =>
+        when SPEED_ZERO      => stands       <= '1' when acc = 0 else '0';
+        when PROFILE =>
           busy    <= shift_left(busy, 1);
           busy(0) <= '1' when acc /= 0 else '0';
         when others          => null;
@@ -326,25 +325,23 @@ begin
       end if;
 
       if rst = '1' then
-        age     <= (others => '0');
-        pc      <= (others => '0');
-        running <= '0';
-        plans   <= '0';
-        word    <= NO_WORD;
-        part    <= (others => '0');
-        left    <= (others => '0');
-        first   <= '1';
-        bits    <= (others => '0');
-        lead    <= (others => '0');
-        written <= (others => '0');
-        acc     <= (others => '0');
-        below   <= '0';
-        picked  <= to_unsigned(X_PICKED, 3);
-        goes_on <= '0';
-        down    <= '0';
-        stands  <= '1';
-        busy    <= (others => '0');
+        age       <= (others => '0');
         out_valid <= '0';
+        pc        <= (others => '0');
+        running   <= '0';
+        plans     <= '0';
+        word      <= NO_WORD;
+        part      <= (others => '0');
+        left      <= (others => '0');
+        first     <= '1';
+        bits      <= (others => '0');
+        lead      <= (others => '0');
+        written   <= (others => '0');
+        picked    <= to_unsigned(X_PICKED, 3);
+        goes_on   <= '0';
+        down      <= '0';
+        stands    <= '1';
+        busy      <= (others => '0');
       end if;
     end if;
   end process;

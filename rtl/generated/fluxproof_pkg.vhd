@@ -447,6 +447,7 @@ package fluxproof_pkg is
   constant POSITION_TRAJECTORY_SMALL : natural := 26;
   constant POSITION_TRAJECTORY_BUSY_W : natural := 4;
   constant POSITION_TRAJECTORY_DROP : natural := 9;
+  constant POSITION_TRAJECTORY_SPEED_UP : natural := 10;
   constant POSITION_TRAJECTORY_LOW : natural := 17;
   constant POSITION_TRAJECTORY_TO_PU : natural := 17;
   constant POSITION_TRAJECTORY_TO_INTEGRAL : natural := 5;
