@@ -347,6 +347,8 @@ begin
     signal period_valid, model_valid, model_ab_valid : std_logic;
     signal factor_valid, delta_valid, merge_valid    : std_logic;
     signal comp_valid                                : std_logic;
+    signal towards_valid                             : std_logic;
+    signal towards_alpha, towards_beta               : signed(PU_W - 1 downto 0);
     signal r                                         : unsigned(RESISTANCE_W - 1 downto 0);
     signal rho                                       : unsigned(RHO_W - 1 downto 0);
     signal voltage_known                             : std_logic;
@@ -405,9 +407,21 @@ begin
                 s_beta => s_beta, v_leg => v_leg,
                 out_valid => open, u_clean_alpha => u_clean_alpha, u_clean_beta => u_clean_beta);
 
+    by_direction : if POSITION_LOOP = 1 generate
+      towards : entity work.direction_current
+        port map (clk => clk, rst => rst, in_valid => trig_valid,
+                  i_d_ref => i_d_limited, i_q_ref => o.i_q_ref, i_alpha => i_alpha, i_beta => i_beta,
+                  cos_theta => cos_theta, sin_theta => sin_theta, sat_d => o.sat_d, sat_q => o.sat_q, run => run,
+                  out_valid => towards_valid, towards_alpha => towards_alpha, towards_beta => towards_beta);
+    else generate
+      towards_valid <= comp_valid;
+      towards_alpha <= i_alpha;
+      towards_beta  <= i_beta;
+    end generate by_direction;
+
     directions : entity work.current_directions
-      port map (clk => clk, rst => rst, in_valid => comp_valid,
-                i_alpha => i_alpha, i_beta => i_beta, omega_me => o.omega_me,
+      port map (clk => clk, rst => rst, in_valid => towards_valid,
+                i_alpha => towards_alpha, i_beta => towards_beta, omega_me => o.omega_me,
                 k_ahead => settings.k_ahead, k_sign => settings.k_sign,
                 out_valid => open, s_alpha => s_alpha, s_beta => s_beta);
 

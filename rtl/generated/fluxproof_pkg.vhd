@@ -1138,6 +1138,10 @@ package fluxproof_pkg is
   constant DELTA_LAMBDA_FADE : natural := 4;
   constant DELTA_LAMBDA_N_MAX : natural := 12;
 
+  -- direction_current: none: docs/position.md
+  constant DIRECTION_CURRENT_LATENCY : positive := 7;
+  constant DIRECTION_CURRENT_MOST : natural := 90111;
+
   -- flux_compensation: 001, eq. (17): (K_p + K_i/s)*delta_lambda; the last term of eq. (16)
   constant FLUX_COMPENSATION_LATENCY : positive := 9;
   constant FLUX_COMPENSATION_DROP_P : natural := 3;
