@@ -412,6 +412,7 @@ begin
         port map (clk => clk, rst => rst, in_valid => trig_valid,
                   i_d_ref => i_d_limited, i_q_ref => o.i_q_ref, i_alpha => i_alpha, i_beta => i_beta,
                   cos_theta => cos_theta, sin_theta => sin_theta, sat_d => o.sat_d, sat_q => o.sat_q, run => run,
+                  position_mode => settings.position_mode,
                   out_valid => towards_valid, towards_alpha => towards_alpha, towards_beta => towards_beta);
     else generate
       towards_valid <= comp_valid;

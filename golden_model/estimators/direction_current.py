@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The current whose directions are compensated in a core with a position loop: the reference.
+"""The current whose directions are compensated: in position mode the reference.
 
-    i_alpha = i_d_ref*cos_theta - i_q_ref*sin_theta
-    i_beta  = i_d_ref*sin_theta + i_q_ref*cos_theta           while the regulators follow, else the measured current
+    towards_alpha = i_d_ref*cos_theta - i_q_ref*sin_theta
+    towards_beta  = i_d_ref*sin_theta + i_q_ref*cos_theta           in position mode, else the measured current
 
 A measured current of zero has no direction.  A leg then lacks the compensation that would let its current begin to
 flow: until the integral of the current regulator has passed the loss of the legs, several milliseconds, a small
@@ -27,13 +27,13 @@ def step(inputs, regs):
     x = inputs
     i_d, i_q = clamp(x.i_d_ref, -VECTOR, VECTOR - 1), clamp(x.i_q_ref, -VECTOR, VECTOR - 1)
     alpha, beta = rotate.step(i_d, i_q, x.cos_theta, x.sin_theta)
-    if x.run and x.sat_d == 0 and x.sat_q == 0:
+    if regs.position_mode and x.run and x.sat_d == 0 and x.sat_q == 0:
         return alpha, beta
     return x.i_alpha, x.i_beta
 
 
 def reference(v, _state):
-    if not v["run"] or v["sat_d"] or v["sat_q"]:
+    if not v["position_mode"] or not v["run"] or v["sat_d"] or v["sat_q"]:
         return {"towards_alpha": v["i_alpha"], "towards_beta": v["i_beta"]}
     i_d, i_q = (min(max(v[name], -VECTOR * PU.lsb), (VECTOR - 1) * PU.lsb) for name in ("i_d_ref", "i_q_ref"))
     c, s = v["cos_theta"], v["sin_theta"]
@@ -50,7 +50,8 @@ def stimuli(rng, _config):
     for ref in (0, 1, -1, VECTOR - 1, VECTOR, -VECTOR, -VECTOR - 1, PU.hi, PU.lo):
         for run, sat_d, sat_q in ((1, 0, 0), (0, 0, 0), (1, 1, 0), (1, 0, -1)):
             row = {"i_d_ref": ref, "i_q_ref": int(rng.integers(PU.lo, PU.hi)), "run": run, "sat_d": sat_d}
-            rows.append({**row, "sat_q": sat_q, "i_alpha": 777, "i_beta": -888, "cos_theta": 65536, "sin_theta": 0})
+            row |= {"sat_q": sat_q, "position_mode": 1, "i_alpha": 777, "i_beta": -888}
+            rows.append({**row, "cos_theta": 65536, "sin_theta": 0})
     return rows
 
 
@@ -65,7 +66,8 @@ INPUTS = (
     Port("run", BIT, doc="1: the gates are switching"),
 )
 Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
-Registers = namedtuple("Registers", [])
+REGISTERS = (Port("position_mode", BIT, doc="1: position control, over speed control"),)
+Registers = namedtuple("Registers", [p.name for p in REGISTERS])
 
 BLOCK = Block(
     name="direction_current",
@@ -74,6 +76,7 @@ BLOCK = Block(
     step=step,
     takes=(Inputs, Registers),
     inputs=INPUTS,
+    registers=REGISTERS,
     outputs=(
         Port("towards_alpha", PU, doc="current whose directions are compensated, alpha"),
         Port("towards_beta", PU, doc="current whose directions are compensated, beta"),

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: BSD-3-Clause
--- Purpose: the current whose directions are compensated in a core with a position loop: the reference in the stator
--- frame while the regulators follow, else the measured current.  A current of zero has no direction, its reference has.
+-- Purpose: the current whose directions are compensated: in position mode the reference in the stator frame, while the
+-- regulators follow it, else the measured current.  A current of zero has no direction, its reference has.
 --   towards_alpha = i_d_ref*cos_theta - i_q_ref*sin_theta
 --   towards_beta  = i_d_ref*sin_theta + i_q_ref*cos_theta
 -- Formats: references limited to the range of a rotation, otherwise those of rotate.
@@ -27,6 +27,7 @@ entity direction_current is
     sat_d         : in  signed(1 downto 0);
     sat_q         : in  signed(1 downto 0);
     run           : in  std_logic;
+    position_mode : in  std_logic;
     out_valid     : out std_logic;
     towards_alpha : out signed(PU_W - 1 downto 0);
     towards_beta  : out signed(PU_W - 1 downto 0)
@@ -64,7 +65,7 @@ begin
       if valid_6 = '1' then
         towards_alpha <= alpha_6;
         towards_beta  <= beta_6;
-        if run = '0' or sat_d /= 0 or sat_q /= 0 then
+        if position_mode = '0' or run = '0' or sat_d /= 0 or sat_q /= 0 then
           towards_alpha <= i_alpha;
           towards_beta  <= i_beta;
         end if;
