@@ -474,7 +474,7 @@ def step_table(state, sample, regs, config, of_speed, table):
     (omega_chord,) = chord_speed.step(omega_me, r.k_chord)
     u_dec_d, u_dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
     voltage_limit_state, (u_d, u_q, sat_d, sat_q) = voltage_limit.step(
-        state.of_voltage_limit, u_pi_d, u_pi_q, u_dec_d, u_dec_q, given.u_comp_d, given.u_comp_q, u_max
+        state.of_voltage_limit, u_pi_d, u_pi_q, u_dec_d, u_dec_q, given.u_comp_d, given.u_comp_q, u_max, lambda_d
     )
 
     u_alpha, u_beta = inverse_park.step(u_d, u_q, cos_out, sin_out)

@@ -318,7 +318,7 @@ begin
   circle : entity work.voltage_limit
     port map (clk => clk, rst => rst, in_valid => decoupling_valid,
               u_pi_d => u_pi_d, u_pi_q => u_pi_q, u_dec_d => o.u_dec_d, u_dec_q => o.u_dec_q, u_comp_d => e.u_comp_d,
-              u_comp_q => e.u_comp_q, u_max => o.u_max,
+              u_comp_q => e.u_comp_q, u_max => o.u_max, lambda_d => o.lambda_d,
               out_soon => dq_voltage_soon, out_valid => dq_voltage_valid, u_d => o.u_d, u_q => o.u_q, sat_d => o.sat_d,
               sat_q => o.sat_q);
 
