@@ -77,6 +77,8 @@ class Seen(NamedTuple):
     i_c: int
     i_alpha: int
     i_beta: int
+    towards_alpha: int  # the current whose directions are compensated
+    towards_beta: int
     i_d: int
     i_q: int
     current_at_rail: int
@@ -179,7 +181,7 @@ def step(state, given, seen, sample, regs, config):
     clean_state, (u_clean_alpha, u_clean_beta) = clean_voltage.step(
         state.of_clean_voltage, u_applied_alpha, u_applied_beta, state.s_alpha, state.s_beta, state.v_leg
     )
-    s_alpha, s_beta = current_directions.step(v.i_alpha, v.i_beta, v.omega_me, r.k_ahead, r.k_sign)
+    s_alpha, s_beta = current_directions.step(v.towards_alpha, v.towards_beta, v.omega_me, r.k_ahead, r.k_sign)
     lambda_c_d, lambda_c_q, model_limited = current_model.step(
         v.model_d, v.model_q, state.lambda_add_d, state.lambda_add_q
     )

@@ -31,6 +31,7 @@ from golden_model.estimators import (
     current_directions,
     current_model,
     delta_lambda,
+    direction_current,
     flux_compensation,
     flux_estimate,
     flux_merge,
@@ -111,7 +112,8 @@ WIRING = {
     "torque_estimate": (torque, ("flux",)),
     "inverter_loss": (v_dead_adaline, ("circle", "direction_functions")),
     "magnet_flux": (psi_adaline, ("circle", "direction_functions")),
-    "directions": (current_directions, ("compensation_dq", "stator_frame", "speed_measurement")),
+    "towards": (direction_current, ("regeneration", "current_circle", "stator_frame", "trig")),
+    "directions": (current_directions, ("compensation_dq", "stator_frame", "speed_measurement", "towards")),
     "monitor": (flux_monitor, ("inverter_loss", "compensation", "merge", "bus_reciprocal")),
     "residual": (motor_residual, ("models",)),
     "checks": (sample_checks, ("conditioning", "bus_voltage")),
@@ -128,6 +130,7 @@ WIRING = {
 EARLY = {
     ("stator_frame", "conditioning"): 1,
     ("rotor_frame", "stator_frame"): 1,
+    ("trajectory", "position_regulator"): position_trajectory.LATE,
     ("bus_reciprocal", "bus_voltage"): u_dc_conditioning.AHEAD,
     ("period_voltage", "bus_voltage"): u_dc_conditioning.AHEAD,
     ("checks", "bus_voltage"): u_dc_conditioning.AHEAD,
@@ -471,7 +474,7 @@ def step_table(state, sample, regs, config, of_speed, table):
     (omega_chord,) = chord_speed.step(omega_me, r.k_chord)
     u_dec_d, u_dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
     voltage_limit_state, (u_d, u_q, sat_d, sat_q) = voltage_limit.step(
-        state.of_voltage_limit, u_pi_d, u_pi_q, u_dec_d, u_dec_q, given.u_comp_d, given.u_comp_q, u_max
+        state.of_voltage_limit, u_pi_d, u_pi_q, u_dec_d, u_dec_q, given.u_comp_d, given.u_comp_q, u_max, lambda_d
     )
 
     u_alpha, u_beta = inverse_park.step(u_d, u_q, cos_out, sin_out)
@@ -482,8 +485,16 @@ def step_table(state, sample, regs, config, of_speed, table):
 
     after, e = estimation.kept(state), NOTHING_ESTIMATED
     if c.estimators:
+        towards_alpha, towards_beta = i_alpha, i_beta
+        if c.position_loop:
+            wanted = direction_current.Inputs(
+                i_d_ref=i_d_limited, i_q_ref=i_q_ref, i_alpha=i_alpha, i_beta=i_beta, cos_theta=cos_theta,
+                sin_theta=sin_theta, sat_d=state.sat_d, sat_q=state.sat_q, run=x.run,
+            )  # fmt: skip
+            towards_alpha, towards_beta = direction_current.step(wanted, r)
         seen = estimation.Seen(
-            i_a=i_a, i_b=i_b, i_c=i_c, i_alpha=i_alpha, i_beta=i_beta, i_d=i_d, i_q=i_q,
+            i_a=i_a, i_b=i_b, i_c=i_c, i_alpha=i_alpha, i_beta=i_beta, towards_alpha=towards_alpha,
+            towards_beta=towards_beta, i_d=i_d, i_q=i_q,
             current_at_rail=current_at_rail, u_dc=u_dc,
             u_dc_at_rail=u_dc_at_rail, u_dc_low=u_dc_low, omega_me=omega_me, omega_chord=omega_chord,
             cos_theta=cos_theta, sin_theta=sin_theta, model_d=model_d, model_q=model_q, lambda_d=lambda_d,

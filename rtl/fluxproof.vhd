@@ -208,7 +208,6 @@ begin
               out_valid => circle_valid, i_d_limited => i_d_limited, i_q_max => i_q_max);
 
   by_position : if POSITION_LOOP = 1 generate
-    signal position_valid : std_logic;
     signal position_ref   : signed(o.shaft_position'range);
     signal omega_ff       : signed(INTEGRAL_W - 1 downto 0);
     signal at_rest        : std_logic;
@@ -221,11 +220,11 @@ begin
                 reverse => settings.reverse, position_restart => settings.position_restart,
                 position_mode => settings.position_mode, position_kp => settings.position_kp,
                 position_band => settings.position_band, omega_most => settings.omega_most,
-                out_valid => position_valid, shaft_position => o.shaft_position, position_error => o.position_error,
+                out_valid => open, shaft_position => o.shaft_position, position_error => o.position_error,
                 omega_asked => omega_asked, regulates => regulates);
 
     trajectory : entity work.position_trajectory
-      port map (clk => clk, rst => rst, in_valid => position_valid,
+      port map (clk => clk, rst => rst, in_valid => latch_valid,
                 shaft_position => o.shaft_position, run => run,
                 position_mode => settings.position_mode, position_target => settings.position_target,
                 move_speed => settings.move_speed, move_step => settings.move_step, jerk_bits => settings.jerk_bits,
@@ -319,7 +318,7 @@ begin
   circle : entity work.voltage_limit
     port map (clk => clk, rst => rst, in_valid => decoupling_valid,
               u_pi_d => u_pi_d, u_pi_q => u_pi_q, u_dec_d => o.u_dec_d, u_dec_q => o.u_dec_q, u_comp_d => e.u_comp_d,
-              u_comp_q => e.u_comp_q, u_max => o.u_max,
+              u_comp_q => e.u_comp_q, u_max => o.u_max, lambda_d => o.lambda_d,
               out_soon => dq_voltage_soon, out_valid => dq_voltage_valid, u_d => o.u_d, u_q => o.u_q, sat_d => o.sat_d,
               sat_q => o.sat_q);
 
@@ -348,6 +347,8 @@ begin
     signal period_valid, model_valid, model_ab_valid : std_logic;
     signal factor_valid, delta_valid, merge_valid    : std_logic;
     signal comp_valid                                : std_logic;
+    signal towards_valid                             : std_logic;
+    signal towards_alpha, towards_beta               : signed(PU_W - 1 downto 0);
     signal r                                         : unsigned(RESISTANCE_W - 1 downto 0);
     signal rho                                       : unsigned(RHO_W - 1 downto 0);
     signal voltage_known                             : std_logic;
@@ -406,9 +407,22 @@ begin
                 s_beta => s_beta, v_leg => v_leg,
                 out_valid => open, u_clean_alpha => u_clean_alpha, u_clean_beta => u_clean_beta);
 
+    by_direction : if POSITION_LOOP = 1 generate
+      towards : entity work.direction_current
+        port map (clk => clk, rst => rst, in_valid => trig_valid,
+                  i_d_ref => i_d_limited, i_q_ref => o.i_q_ref, i_alpha => i_alpha, i_beta => i_beta,
+                  cos_theta => cos_theta, sin_theta => sin_theta, sat_d => o.sat_d, sat_q => o.sat_q, run => run,
+                  position_mode => settings.position_mode,
+                  out_valid => towards_valid, towards_alpha => towards_alpha, towards_beta => towards_beta);
+    else generate
+      towards_valid <= comp_valid;
+      towards_alpha <= i_alpha;
+      towards_beta  <= i_beta;
+    end generate by_direction;
+
     directions : entity work.current_directions
-      port map (clk => clk, rst => rst, in_valid => comp_valid,
-                i_alpha => i_alpha, i_beta => i_beta, omega_me => o.omega_me,
+      port map (clk => clk, rst => rst, in_valid => towards_valid,
+                i_alpha => towards_alpha, i_beta => towards_beta, omega_me => o.omega_me,
                 k_ahead => settings.k_ahead, k_sign => settings.k_sign,
                 out_valid => open, s_alpha => s_alpha, s_beta => s_beta);
 

@@ -63,6 +63,13 @@ def test_following_error_with_the_right_inertia():
     assert np.abs(figures.counts(drive, plain.observed)).max() > 100.0
 
 
+def test_a_shaft_without_friction_stays_within_a_count_of_4096():
+    """Directions of the measured current, which is zero at rest, let it drift: 52 codes of 65,536 on this way."""
+    drive = figures.case("paper001")
+    run = figures.play(drive, figures.there_and_back(drive)[0])
+    assert np.abs(figures.counts(drive, run.observed)).max() <= 16.0
+
+
 def test_without_position_mode_every_bit_is_as_before():
     """position_loop with position_mode = 0 gives the outputs of a core without it, but for the position."""
     drive = positioned("paper001")

@@ -3,6 +3,7 @@
 
 import dataclasses
 import json
+import math
 
 import numpy as np
 import pytest
@@ -13,11 +14,12 @@ from fluxproof.plant import IMPOSED_SPEED
 from fluxproof.print_registers import c_lines, load_list
 from golden_model import drive as drives
 from golden_model import torque_table
-from golden_model.control import current_limit, current_reference, torque_reference
+from golden_model.control import current_limit, current_reference, torque_reference, voltage_limit
 from golden_model.control.torque_reference import BLANK, COLUMNS, ROWS, WORDS
 from golden_model.formats import PU
 from golden_model.registers import registers
 from golden_model.units import to_si
+from studies.speed import figures
 from studies.speed.drives import over_the_border, scene, weakened
 
 DRIVE = weakened(DRIVES / "paper001.toml")
@@ -96,6 +98,24 @@ def test_above_base_speed_there_is_torque_within_the_circle_and_it_is_released()
     )
     slow = simulate(DRIVE, SET, scene(DRIVE, np.full(n, 1.0), speed), mode=IMPOSED_SPEED)
     assert slow.plant["i_d"].min() < -3.0 and abs(slow.plant["i_d"][-200:].mean()) < 0.1
+
+
+def test_weakened_too_far_the_d_axis_has_the_whole_circle():
+    """The voltage that the q axis' EMF needs is kept from u_d, unless lambda_d < 0: then i_d would run away."""
+    u_max, emf = 40000, 30000
+    for lambda_d, room in ((1, math.isqrt(u_max**2 - emf**2)), (-1, u_max)):
+        state, _ = voltage_limit.step(voltage_limit.State(), 0, 0, 0, emf, 0, 0, u_max, lambda_d)
+        _, (u_d, *_) = voltage_limit.step(state, 60000, 0, 0, emf, 0, 0, u_max, lambda_d)
+        assert u_d == pytest.approx(room, abs=3)
+
+
+@pytest.mark.slow
+def test_demands_beyond_what_exists_while_the_bus_moves():
+    """A reluctance machine whose q axis keeps its EMF's voltage with lambda_d < 0 reaches 1.29 of its limit here."""
+    case = figures.cases()[1]
+    plane = torque_table.Plane(case.truth, case.drive.machine.pole_pairs, case.drive.current_limit_a)
+    trips, peak, *_ = figures.hostile(case, plane, 1e-3, demands=20)
+    assert trips["ours"] == 0 and peak["ours"] < 1.15
 
 
 def test_estimate_is_right_from_the_start():

@@ -1,125 +1,135 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Trajectory to a target with limited speed, acceleration and jerk, and what the loops below are fed forward.
 
-position_plan chooses the jerk of each section of M = 8*2**jerk_bits samples; sums make the motion of it:
+position_plan chooses the change of each section of M = 8*2**jerk_bits samples; sums make the motion of it, once for
+the torque and once for position and speed, which are torque_lead samples later:
 
-    a += jerk;  v += a;  position_ref += v torque_lead samples later
+    a += change;  v += a            late_a += late_change;  late_v += late_a;  way += late_v
 
 Acceleration is move_step/M at most, jerk 2*move_step/M**2.  Integers throughout: nothing is lost, and at rest
 position_ref is the target.  Without ``position_mode`` or ``run`` the profile follows the measured speed and
 position_ref the position, so that position mode begins at the speed there is.
 
-    omega_ff += k_filter*(k_speed*v - omega_ff)         the speed as the measurement sees it
-    torque_ff = k_inertia*a + k_viscous*v + coulomb*sign(v)       with v of now; zero without position_mode or run
+    omega_ff += k_filter*(k_speed*late_v - omega_ff)              the speed as the measurement sees it
+    torque_ff = k_inertia*a + k_viscous*v + coulomb*sign(v)       zero without position_mode or run
 
-Formats: way S(13,44) turns of the shaft, wraps; v and a S(-3,44) per sample.  v is rounded to 36, a to 42 fraction
-bits; these, products and position_ref half up; a's factor, both products, torque_ff and omega_ff saturate.
+In the last eight samples of a section the next one is planned: in the second of them the target is read, at rest
+move_step, jerk_bits and torque_lead too, in the third the positions, in the fifth move_speed.
+
+Formats: way S(13,44) turns of the shaft, wraps, half an LSB of a position above position_ref; v and a S(-3,44) per
+sample, floored to 35 fraction bits in products, as are the products to 17 bits less and all that follows.  The error of
+the filter is limited to +-2, torque_ff and omega_ff saturate; the state of the filter does not.
 """
 
 from collections import namedtuple
 from typing import NamedTuple
 
 from golden_model.block import Block, Port
-from golden_model.control import position_plan
 from golden_model.control.position_control import POSITION, POSITION_W
-from golden_model.control.position_plan import SMALL, WAY, WAY_W
-from golden_model.fixed import Format, round_half_up, round_sat, saturate, wrap_s
-from golden_model.formats import BIT, INTEGRAL, INTEGRAL_W, KP, PU, PU_W
+from golden_model.control.position_plan import BUSY_W, SECTION_BITS, SMALL, SPEED_UP, WAY, WAY_W, Plan, planned
+from golden_model.fixed import Format, clamp, saturate, wrap_s
+from golden_model.formats import BIT, INTEGRAL, INTEGRAL_W, PU, PU_W
 from golden_model.io.speed import K_FILTER, K_SPEED
 from golden_model.kernel import kernel
 
-V_DROP, A_DROP = 8, 2  # bits of v and a left out of products
-FACTOR_W = 34  # then, two halves of 17 bits
-K_INERTIA = Format(0, 20, 4)
-DROP_OMEGA = WAY.frac_bits - V_DROP + K_SPEED.frac_bits - INTEGRAL.frac_bits
-DROP_TORQUE = WAY.frac_bits - A_DROP + K_INERTIA.frac_bits - PU.frac_bits
-DROP_VISCOUS = WAY.frac_bits - V_DROP + KP.frac_bits - PU.frac_bits
-DROP_ERROR = 6
-DROP_FILTER = INTEGRAL.frac_bits - DROP_ERROR + K_FILTER.frac_bits - INTEGRAL.frac_bits
+DROP = 9  # bits of v and a left out of products
+LOW = 17  # bits of the lower half of a factor, and of a product left out
+SUM = Format(1, 24, 33)  # torque_ff and the filter before they are narrowed
+ERROR_W = 18  # of its upper half
+K_INERTIA = Format(0, 21, 3)
+K_VISCOUS = Format(0, 9, 15)
+PARTS = 1 << SECTION_BITS  # samples in which a section is planned
+HALF = 1 << (SMALL - 1)
+LATE = 7  # position_control's latency: the program starts beside it
+LATENCY = 52
+UP_INERTIA = SUM.frac_bits - (WAY.frac_bits - DROP - LOW + K_INERTIA.frac_bits)
+UP_SPEED = SUM.frac_bits - (WAY.frac_bits - DROP - LOW + K_SPEED.frac_bits)
+TO_PU = SUM.frac_bits - PU.frac_bits
+TO_INTEGRAL = SUM.frac_bits - INTEGRAL.frac_bits
 
 
 class State(NamedTuple):
-    phase: int = 0  # samples since the section's begin
-    lead: int = 0  # torque_lead in force
-    jerk: int = 0
-    at_rest: int = 0
+    part: int = 0  # sample of eight
+    left: int = 0  # eights of the section that are left after this one
+    first: int = 1  # 1: the first eight
+    bits: int = 0  # jerk_bits, torque_lead, move_step in force
+    lead: int = 0
+    gain: int = 0
     a: int = 0
     v: int = 0
-    v_1: int = 0
-    v_2: int = 0
-    v_3: int = 0
-    v_4: int = 0
-    v_5: int = 0
-    v_6: int = 0
+    late_change: int = 0
+    late_a: int = 0
+    late_v: int = 0
     ahead: int = 0  # way of the profile that position_ref has not gone yet
     way: int = 0  # position_ref, unrounded
-    omega_ff: int = 0
+    omega: int = 0  # SUM
+    goal: int = 0  # the target within the stops
+    mark: int = 0  # position at the last plan
+    d: int = 0  # way to the goal, or gone
+    follows: int = 0
+    most: int = 0
     # Last, the plan's, under its names
-    bits: int = 0
-    gain: int = 0
-    mark: int = 0
     speed: int = 0
     stop: int = 0
     down: int = 0
     last: int = 0
     slope: int = 0
     change: int = 0
+    busy: int = 0
 
 
 @kernel
-def delayed(state, v, lead):
-    """v of ``lead`` samples ago; the state's are those before v."""
-    past = v
-    if lead == 1:
-        past = state.v
-    elif lead == 2:
-        past = state.v_1
-    elif lead == 3:
-        past = state.v_2
-    elif lead == 4:
-        past = state.v_3
-    elif lead == 5:
-        past = state.v_4
-    elif lead == 6:
-        past = state.v_5
-    elif lead == 7:
-        past = state.v_6
-    return past
+def product(k, factor):
+    """k*factor in two halves, the lower one floored first."""
+    return (k * factor) >> LOW
 
 
 @kernel
 def step(state, inputs, regs):
-    s, r, position, run = state, regs, inputs.shaft_position, inputs.run
-    active = 1 if r.position_mode and run else 0
-    lead, jerk, ahead, at_rest = s.lead, s.jerk, s.ahead, s.at_rest
-    plan = position_plan.State(
-        bits=s.bits, gain=s.gain, mark=s.mark, speed=s.speed, stop=s.stop, down=s.down, last=s.last, slope=s.slope,
-        change=s.change,
-    )  # fmt: skip
-    if s.phase == 0:
-        seen = position_plan.Inputs(shaft_position=position, active=active, way=s.way, ahead=s.ahead)
-        plan, (jerk, advance, _, still, at_rest) = position_plan.step(plan, seen, r)
-        ahead += advance
-        lead = r.torque_lead if still else s.lead
-    a = s.a + jerk
+    s, r, position = state, regs, (inputs.shaft_position << SMALL) + HALF
+    active = 1 if r.position_mode and inputs.run else 0
+    late_change = s.change if s.first and s.part == s.lead else s.late_change
+    a = s.a + s.change
     v = s.v + a
-    v_used = delayed(s, v, lead)
-    way = wrap_s((s.way if active else position << SMALL) + v_used, WAY_W)
-    raw = round_sat(r.k_speed * round_half_up(v_used, V_DROP), DROP_OMEGA, INTEGRAL_W)
-    error = round_half_up(raw - s.omega_ff, DROP_ERROR)
-    omega_ff = saturate(s.omega_ff + round_half_up(r.k_filter * error, DROP_FILTER), INTEGRAL_W)
-    by_inertia = round_sat(r.k_inertia * saturate(round_half_up(a, A_DROP), FACTOR_W), DROP_TORQUE, PU_W)
-    viscous = round_sat(r.k_viscous * round_half_up(v, V_DROP), DROP_VISCOUS, PU_W)
-    coulomb = r.coulomb if v > 0 else -r.coulomb if v < 0 else 0
-    torque_ff = saturate(by_inertia + viscous + coulomb, PU_W)
+    late_a = s.late_a + late_change
+    late_v = s.late_v + late_a
+    way = wrap_s((s.way if active else position) + late_v, WAY_W)
+    ahead = s.ahead - late_v
+    torque = (product(r.k_inertia, a >> DROP) << UP_INERTIA) + product(r.k_viscous, v >> DROP)
+    torque += (r.coulomb if v > 0 else -r.coulomb if v < 0 else 0) << TO_PU
+    raw = product(r.k_speed, late_v >> DROP) << UP_SPEED
+    error = raw - s.omega
+    error = saturate(error >> LOW, ERROR_W) << LOW | error & ((1 << LOW) - 1)
+    omega = s.omega + product(r.k_filter << 1, error)
+
+    part, left, first, bits, lead, gain = s.part, s.left, s.first, s.bits, s.lead, s.gain
+    goal, mark, d, follows, most = s.goal, s.mark, s.d, s.follows, s.most
+    plan = Plan(s.speed, s.stop, s.down, s.last, s.slope, s.change, s.busy)
+    if left == 0:
+        if part == 1:
+            goal = clamp(r.position_target, r.stop_low, r.stop_high) if r.use_stops else r.position_target
+            if s.busy == 0:
+                bits, lead, gain = r.jerk_bits, r.torque_lead, r.move_step
+        elif part == 2:
+            follows = 1 - active
+            d = wrap_s(position - mark if follows else (goal << SMALL) + HALF - way - ahead, WAY_W)
+            mark = position
+        elif part == 4:
+            most = r.move_speed
+        elif part == PARTS - 1:
+            plan = planned(plan, d, follows, most, bits, gain)
+            ahead += plan.last << (3 * (SECTION_BITS + bits))
+    if part == PARTS - 1:
+        first = 1 if left == 0 else 0
+        left = (1 << bits) - 1 if left == 0 else left - 1
     following = State(
-        phase=(s.phase + 1) & position_plan.last_sample(plan.bits), lead=lead, jerk=jerk, at_rest=at_rest, a=a, v=v,
-        v_1=s.v, v_2=s.v_1, v_3=s.v_2, v_4=s.v_3, v_5=s.v_4, v_6=s.v_5, ahead=ahead - v_used, way=way,
-        omega_ff=omega_ff, bits=plan.bits, gain=plan.gain, mark=plan.mark, speed=plan.speed, stop=plan.stop,
-        down=plan.down, last=plan.last, slope=plan.slope, change=plan.change,
+        part=(part + 1) % PARTS, left=left, first=first, bits=bits, lead=lead, gain=gain, a=a, v=v,
+        late_change=late_change, late_a=late_a, late_v=late_v, ahead=ahead, way=way, omega=omega, goal=goal, mark=mark,
+        d=d, follows=follows, most=most, speed=plan.speed, stop=plan.stop, down=plan.down, last=plan.last,
+        slope=plan.slope, change=plan.change, busy=plan.busy,
     )  # fmt: skip
-    position_ref = wrap_s(round_half_up(way, SMALL), POSITION_W)
-    return following, (position_ref, omega_ff, torque_ff if active else 0, at_rest)
+    torque_ff = saturate(torque >> TO_PU, PU_W) if active else 0
+    return following, (way >> SMALL, saturate(omega >> TO_INTEGRAL, INTEGRAL_W), torque_ff, int(plan.busy == 0))
 
 
 def reference(v, state):
@@ -127,28 +137,26 @@ def reference(v, state):
     active = v["position_mode"] and v["run"]
     regs = Registers(**{p.name: p.fmt.to_int(v[p.name]) for p in BLOCK.registers})
     after, _ = step(state, Inputs(POSITION.to_int(v["shaft_position"]), int(v["run"])), regs)
-    used = (after.way - (state.way if active else POSITION.to_int(v["shaft_position"]) << SMALL)) * WAY.lsb
-    used = (used + 8192.0) % 16384.0 - 8192.0
-    raw, half = INTEGRAL.limit(v["k_speed"] * used), POSITION.lsb / 2
-    omega = state.omega_ff * INTEGRAL.lsb
-    torque = PU.limit(v["k_inertia"] * Format(1, -9, 42).limit(after.a * WAY.lsb))
-    torque += PU.limit(v["k_viscous"] * after.v * WAY.lsb) + v["coulomb"] * ((after.v > 0) - (after.v < 0))
+    error = PU.limit(v["k_speed"] * after.late_v * WAY.lsb - state.omega * SUM.lsb)
+    torque = v["k_inertia"] * after.a * WAY.lsb + v["k_viscous"] * after.v * WAY.lsb
+    torque += v["coulomb"] * ((after.v > 0) - (after.v < 0))
+    half = POSITION.lsb / 2
     return {
-        "position_ref": (after.way * WAY.lsb + 8192.0 + half) % 16384.0 - 8192.0 - half,  # rounded up at the end: wraps
-        "omega_ff": INTEGRAL.limit(omega + v["k_filter"] * (raw - omega)),
+        "position_ref": after.way * WAY.lsb - half,
+        "omega_ff": INTEGRAL.limit(state.omega * SUM.lsb + v["k_filter"] * error),
         "torque_ff": PU.limit(torque) if active else 0.0,
-        "at_rest": after.at_rest,
+        "at_rest": float(after.busy == 0),
     }
 
 
 def bound(v, _state):
-    """Roundings of v and a at their factors, of the products, of the filter's error and increment, of the position."""
-    v_lsb, a_lsb = 2.0 ** (V_DROP - WAY.frac_bits), 2.0 ** (A_DROP - WAY.frac_bits)
-    omega = v["k_filter"] * (v["k_speed"] * v_lsb / 2 + INTEGRAL.lsb / 2 + 2.0**DROP_ERROR * INTEGRAL.lsb / 2)
+    """Floors of v and a at their factors, of products and outputs, the lower half of a limited error."""
+    factor = 2.0 ** (DROP - WAY.frac_bits)
+    speed = v["k_speed"] * factor + SUM.lsb * 2**UP_SPEED
     return {
         "position_ref": POSITION.lsb / 2,
-        "omega_ff": omega + INTEGRAL.lsb,
-        "torque_ff": v["k_inertia"] * a_lsb / 2 + v["k_viscous"] * v_lsb / 2 + 2 * PU.lsb,
+        "omega_ff": v["k_filter"] * (speed + PU.lsb) + SUM.lsb + INTEGRAL.lsb,
+        "torque_ff": (v["k_inertia"] + v["k_viscous"]) * factor + SUM.lsb * (2**UP_INERTIA + 1) + PU.lsb,
         "at_rest": 0.0,
     }
 
@@ -156,7 +164,7 @@ def bound(v, _state):
 def stimuli(rng, _config):
     """Moves of every length and both directions, targets that change on the way, stops, followed shafts."""
     rows, position = [], 0
-    calm = {"run": 1, "position_mode": 1, "k_speed": 200 << 12, "k_filter": 1 << 16, "k_inertia": 3000 << 4}
+    calm = {"run": 1, "position_mode": 1, "k_speed": 200 << 12, "k_filter": 1 << 16, "k_inertia": 3000 << 3}
 
     def move(samples, shaft=0, **given):
         nonlocal position
@@ -186,12 +194,18 @@ def stimuli(rng, _config):
 
 REGISTERS = (
     Port("position_mode", BIT, doc="1: position control, over speed control"),
-    *position_plan.REGISTERS,
+    Port("position_target", POSITION, doc="position to go to, turns of the shaft"),
+    Port("move_speed", Format(0, -3, 34), doc="largest speed of the trajectory, turns per sample"),
+    Port("move_step", Format(0, 31, 0), doc="largest change of its speed in 8*2**jerk_bits samples"),
+    Port("jerk_bits", Format(0, 3, 0), hi=5, doc="the acceleration builds up in 8*2**jerk_bits samples"),
+    Port("use_stops", BIT, doc="1: the target is kept within stop_low and stop_high"),
+    Port("stop_low", POSITION, doc="soft end stop, turns of the shaft"),
+    Port("stop_high", POSITION, doc="soft end stop, turns of the shaft"),
     Port("torque_lead", Format(0, 3, 0), doc="samples by which torque_ff precedes the position"),
     Port("k_speed", K_SPEED, doc="speed per turn and sample"),
     Port("k_filter", K_FILTER, hi=1 << 16, doc="filter weight of the new sample, 1 = no filter"),
     Port("k_inertia", K_INERTIA, doc="torque, or current, per turn and square of a sample"),
-    Port("k_viscous", KP, doc="torque, or current, of viscous friction per turn and sample"),
+    Port("k_viscous", K_VISCOUS, doc="torque, or current, of viscous friction per turn and sample"),
     Port("coulomb", PU, lo=0, doc="torque, or current, of Coulomb friction"),
 )
 Registers = namedtuple("Registers", [p.name for p in REGISTERS])
@@ -204,7 +218,7 @@ BLOCK = Block(
     step=step,
     takes=(Inputs, Registers),
     inputs=(
-        Port("shaft_position", POSITION, doc="position, turns of the shaft"),
+        Port("shaft_position", POSITION, late=LATE, doc="position, turns of the shaft"),
         Port("run", BIT, doc="1: the gates are switching"),
     ),
     registers=REGISTERS,
@@ -215,17 +229,17 @@ BLOCK = Block(
         Port("at_rest", BIT, doc="1: the trajectory stands"),
     ),
     state=State(),
-    latency=36,
-    interval=37,
+    latency=LATENCY,
+    interval=LATENCY + 1,
     constants={
-        "V_DROP": V_DROP,
-        "A_DROP": A_DROP,
-        "FACTOR_W": FACTOR_W,
-        "DROP_OMEGA": DROP_OMEGA,
-        "DROP_TORQUE": DROP_TORQUE,
-        "DROP_VISCOUS": DROP_VISCOUS,
-        "DROP_ERROR": DROP_ERROR,
-        "DROP_FILTER": DROP_FILTER,
+        "WAY_W": WAY_W,
+        "SMALL": SMALL,
+        "BUSY_W": BUSY_W,
+        "DROP": DROP,
+        "SPEED_UP": SPEED_UP,
+        "LOW": LOW,
+        "TO_PU": TO_PU,
+        "TO_INTEGRAL": TO_INTEGRAL,
     },
     reference=reference,
     bound=bound,

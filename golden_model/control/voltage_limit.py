@@ -3,13 +3,15 @@
 
     limit = min(u_max, room),  u_d = limit(u_pi_d + u_dec_d + u_comp_d, +-limit)
     u_q = limit(u_pi_q + u_dec_q + u_comp_q, +-sqrt(u_max**2 - u_d**2))
-    room = sqrt(u_max**2 - min(|u_dec_q|, u_max)**2)        for the next sample
+    room = sqrt(u_max**2 - min(|u_dec_q|, u_max)**2)        for the next sample;  u_max where lambda_d < 0
     sat_x = -1, 0, +1: the active limit of the axis, for the anti-windup of the regulator
 
 Room: the d axis has priority, but only within the voltage that remains beside the EMF of the last sample.  Without
 this the drive has a second stable point near the voltage limit, reached by a disturbance or a bus sag: u_d at its
 limit, no voltage for u_q, hence little flux, hence i_d far below its reference, hence u_d at its limit, braking with
 more than the rated current.  With it the q axis can always balance its EMF; below the limit nothing changes.
+With lambda_d < 0, weakened too far, the EMF drives i_q towards zero, which is what frees voltage for u_d: a q axis that
+balances it would hold i_q, and u_d would lack the voltage that brings i_d back, the more the further i_d runs away.
 
 Radicands are formed as (u_max - u)*(u_max + u): exact, U(0,32), both factors below 2.  The root is never
 above the true one, so the circle is never left.
@@ -37,7 +39,7 @@ class State(NamedTuple):
 
 
 @kernel
-def step(state, u_pi_d, u_pi_q, u_dec_d, u_dec_q, u_comp_d, u_comp_q, u_max):
+def step(state, u_pi_d, u_pi_q, u_dec_d, u_dec_q, u_comp_d, u_comp_q, u_max, lambda_d):
     sum_d = u_pi_d + u_dec_d + u_comp_d
     sum_q = u_pi_q + u_dec_q + u_comp_q
     limit_d = min(u_max, state.room)
@@ -46,7 +48,7 @@ def step(state, u_pi_d, u_pi_q, u_dec_d, u_dec_q, u_comp_d, u_comp_q, u_max):
     (u_q_max,) = sqrt.step((u_max - u_d) * (u_max + u_d))
     sat_q = side(sum_q, u_q_max)
     u_q = clamp(sum_q, -u_q_max, u_q_max)
-    emf = min(abs(u_dec_q), u_max)
+    emf = min(abs(u_dec_q), u_max) if lambda_d >= 0 else 0
     (room,) = sqrt.step((u_max - emf) * (u_max + emf))
     return State(room), (u_d, u_q, sat_d, sat_q)
 
@@ -78,6 +80,11 @@ def stimuli(_rng, _config):
                 for s in (1, -1):
                     rest = dict.fromkeys(("u_dec_d", "u_dec_q", "u_comp_d", "u_comp_q"), 0)
                     rows.append({"u_pi_d": s * d, "u_pi_q": -s * q, **rest, "u_max": u_max})
+    for u_max, lambda_d in ((30000, 0), (30000, -1), (30000, 1), (65535, -131072)):  # the room with and without its EMF
+        for emf in (u_max - 1, -u_max, u_max // 2):
+            rest = dict.fromkeys(("u_dec_d", "u_pi_q", "u_comp_d", "u_comp_q"), 0)
+            row = {**rest, "u_dec_q": emf, "u_max": u_max, "lambda_d": lambda_d}
+            rows += [{**row, "u_pi_d": 70000}, {**row, "u_pi_d": -70000}]
     return rows
 
 
@@ -94,6 +101,7 @@ BLOCK = Block(
         Port("u_comp_d", PU, doc="compensation voltage, d axis"),
         Port("u_comp_q", PU, late=1, doc="compensation voltage, q axis"),
         Port("u_max", U_MAX, doc="radius of the voltage circle"),
+        Port("lambda_d", PU, doc="flux linkage, d axis"),
     ),
     outputs=(
         Port("u_d", PU, doc="voltage, d axis"),

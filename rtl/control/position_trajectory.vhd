@@ -1,39 +1,45 @@
 -- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: trajectory to a target with limited speed, acceleration and jerk, and what the loops below are fed forward.
---   position_plan gives the jerk of each section of samples;  a += jerk;  v += a;  position_ref += v, torque_lead later
---   omega_ff += k_filter*(k_speed*v - omega_ff);  torque_ff = k_inertia*a + k_viscous*v + coulomb*sign(v)
+--   a += change;  v += a;  late_a += late_change;  late_v += late_a;  way += late_v
+--   omega_ff += k_filter*(k_speed*late_v - omega_ff);  torque_ff = k_inertia*a + k_viscous*v + coulomb*sign(v)
+-- The profile gives the change of each section of M = 8*2**jerk_bits samples:
+--   faster   if speed + move_step <= move_speed  and  stop + 2*speed + move_step <= room:  stop += speed
+--   as fast  if speed             <= move_speed  and  stop + speed               <= room
+--   slower   else:  stop -= speed;  at speed zero: the rest of the way
 -- Without position_mode or run the profile follows the measured speed and position_ref the position; torque_ff is zero.
--- One multiplier is used seven times a sample.
--- Formats: way S(13,44) turns, v and a S(-3,44), factors 34 bits in two halves; omega_ff S(1,28), torque_ff PU.
--- Latency: 36.  Interval: 37.
--- Rounding: half up; a's factor, omega_ff and torque_ff saturate; the way wraps.
+-- One adder, one memory and one multiplier run the program of position_program_pkg.
+-- Formats: way S(13,44) turns, half an LSB of a position above position_ref; v and a S(-3,44); profile in units of
+--   M**2 * 2**-44 turns per sample; products of upper and lower halves, torque_ff and the filter 33 fraction bits.
+-- Latency: 52.  Interval: 53.
+-- Rounding: everything is floored; the filter's error, omega_ff and torque_ff saturate; the way wraps.
 
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 use work.fixed_pkg.all;
 use work.fluxproof_pkg.all;
+use work.position_program_pkg.all;
 
 entity position_trajectory is
   port (
     clk             : in  std_logic;
     rst             : in  std_logic;
     in_valid        : in  std_logic;
-    shaft_position  : in  signed(31 downto 0);
+    shaft_position  : in  signed(31 downto 0);  -- 7 clocks late
     run             : in  std_logic;
     position_mode   : in  std_logic;
     position_target : in  signed(31 downto 0);
     move_speed      : in  unsigned(30 downto 0);
     move_step       : in  unsigned(30 downto 0);
     jerk_bits       : in  unsigned(2 downto 0);
-    torque_lead     : in  unsigned(2 downto 0);
     use_stops       : in  std_logic;
     stop_low        : in  signed(31 downto 0);
     stop_high       : in  signed(31 downto 0);
+    torque_lead     : in  unsigned(2 downto 0);
     k_speed         : in  unsigned(23 downto 0);
     k_filter        : in  unsigned(16 downto 0);
     k_inertia       : in  unsigned(23 downto 0);
-    k_viscous       : in  unsigned(KP_W - 1 downto 0);
+    k_viscous       : in  unsigned(23 downto 0);
     coulomb         : in  signed(PU_W - 1 downto 0);
     out_valid       : out std_logic;
     position_ref    : out signed(31 downto 0);
@@ -45,192 +51,301 @@ end entity position_trajectory;
 
 architecture rtl of position_trajectory is
   constant LATENCY  : positive := POSITION_TRAJECTORY_LATENCY;
-  constant WAY_W    : positive := POSITION_PLAN_WAY_W;
-  constant SMALL    : positive := POSITION_PLAN_SMALL;
-  constant AHEAD_W  : positive := POSITION_PLAN_AHEAD_W;
-  constant FACTOR_W : positive := POSITION_TRAJECTORY_FACTOR_W;
-  constant V_W      : positive := WAY_W - 16;  -- S(-3,44)
-  constant HALF_W   : positive := FACTOR_W / 2;
-  constant SUM_W    : positive := FACTOR_W + 25;
+  constant WAY_W    : positive := POSITION_TRAJECTORY_WAY_W;
+  constant SMALL    : positive := POSITION_TRAJECTORY_SMALL;
+  constant DROP     : positive := POSITION_TRAJECTORY_DROP;
+  constant HALF_W   : positive := POSITION_TRAJECTORY_LOW;  -- bits of a factor's lower half
+  constant SPEED_UP : positive := POSITION_TRAJECTORY_SPEED_UP;
+  constant TO_PU    : positive := POSITION_TRAJECTORY_TO_PU;
+  constant TO_INT   : positive := POSITION_TRAJECTORY_TO_INTEGRAL;
+  constant WORDS    : program_t := program;
+  constant BEGIN_AT : begins_t  := begins(WORDS);
 
-  subtype v_t is signed(V_W - 1 downto 0);
-  type past_t is array (0 to 7) of v_t;
+  subtype acc_t is signed(WAY_W - 1 downto 0);
+  type memory_t is array (0 to 31) of acc_t;
 
-  type state_t is record
-    phase    : unsigned(7 downto 0);
-    lead     : unsigned(2 downto 0);
-    a        : v_t;
-    v        : v_t;
-    ahead    : signed(AHEAD_W - 1 downto 0);
-    way      : signed(WAY_W - 1 downto 0);
-    omega_ff : signed(INTEGRAL_W - 1 downto 0);
-  end record state_t;
-
-  signal state : state_t;
-  signal past  : past_t;  -- v, newest first
-
-  signal valid       : std_logic_vector(0 to LATENCY);
-  signal active      : std_logic;
-  signal starts      : std_logic;  -- the sample begins a section
-  signal still       : std_logic;
-  signal jerk        : signed(37 downto 0);
-  signal advance     : signed(AHEAD_W - 1 downto 0);  -- way of the section
-  signal last_sample : unsigned(7 downto 0);
-  signal planned     : std_logic;
-  signal v_used      : v_t;
-  signal rounded     : signed(WAY_W + 1 - SMALL downto 0);
-  signal factor_v    : signed(FACTOR_W - 1 downto 0);
-  signal factor_a    : signed(FACTOR_W - 1 downto 0);
-  signal factor_now  : signed(FACTOR_W - 1 downto 0);  -- v without torque_lead
-  signal by_inertia  : signed(PU_W - 1 downto 0);
-  signal viscous     : signed(PU_W - 1 downto 0);
-  signal friction    : signed(PU_W - 1 downto 0);
-  signal x           : signed(24 downto 0);
-  signal y           : signed(17 downto 0);
-  signal p           : signed(42 downto 0);
-  signal sum         : signed(SUM_W - 1 downto 0);
-  signal raw         : signed(INTEGRAL_W - 1 downto 0);
-
-  -- The halves of a factor: the low one is positive
-  function high (f : signed) return signed is
+  -- A position in turns, half an LSB above: floors round
+  function turns_of (position : signed(31 downto 0)) return signed is
   begin
-    return resize(shift_right(f, HALF_W), 18);
+    return position & '1' & (SMALL - 2 downto 0 => '0');
   end function;
 
-  function low (f : signed) return signed is
-  begin
-    return signed('0' & f(HALF_W - 1 downto 0));
-  end function;
+  signal age     : unsigned(5 downto 0);  -- of the sample in clocks
+  signal pc      : unsigned(6 downto 0);
+  signal running : std_logic;
+  signal plans   : std_logic;
+  signal word    : word_t;
+  signal count   : unsigned(2 downto 0);
+  signal holds   : std_logic;
+
+  signal part  : unsigned(2 downto 0);  -- sample of eight
+  signal left  : unsigned(4 downto 0);  -- eights of the section that are left after this one
+  signal first : std_logic;
+  signal bits  : unsigned(2 downto 0);
+  signal lead  : unsigned(2 downto 0);
+
+  signal memory    : memory_t;
+  signal written   : std_logic_vector(15 downto 0);
+  signal acc       : acc_t;
+  signal below     : std_logic;  -- acc < 0, with the bit that acc lacks
+  signal met       : std_logic;
+  signal puts      : std_logic;
+  signal moves_acc : std_logic;  -- the word changes acc
+  signal x         : acc_t;
+  signal which     : unsigned(2 downto 0);
+  signal picked    : unsigned(2 downto 0);
+
+  signal factor_x : signed(24 downto 0);
+  signal factor_y : signed(17 downto 0);
+  signal of_error : std_logic;
+  signal goes_on  : std_logic;
+  signal p        : signed(42 downto 0);
+  signal narrow   : signed(INTEGRAL_W - 1 downto 0);
+
+  signal is_active    : std_logic;
+  signal is_follower  : std_logic;
+  signal v_below      : std_logic;
+  signal moves        : std_logic;
+  signal down         : std_logic;
+  signal turned       : std_logic;
+  signal stands       : std_logic;  -- speed = 0
+  signal busy         : unsigned(POSITION_TRAJECTORY_BUSY_W - 1 downto 0);
+  signal is_still     : std_logic;
+  signal fits_speed   : std_logic;
+  signal fits_faster  : std_logic;
+  signal fits_way     : std_logic;
+  signal fits_further : std_logic;
+  signal held         : std_logic;
+  signal is_faster    : std_logic;
+  signal is_as_fast   : std_logic;
+  signal is_slower    : std_logic;
+  signal goes_speed   : std_logic;
 begin
-  rounded  <= round_half_up(resize(state.way, WAY_W + 1), SMALL);
-  valid(0) <= in_valid;
-  active   <= position_mode and run;
-  starts   <= in_valid when state.phase = 0 else '0';
+  is_active  <= position_mode and run;
+  is_still   <= '1' when busy = 0 else '0';
+  held       <= turned and busy(0);
+  is_faster  <= fits_faster and (fits_further or is_follower) and not held;
+  is_as_fast <= fits_speed and (fits_way or is_follower) and not held and not is_faster;
+  is_slower  <= not (is_faster or is_as_fast or held);
+  goes_speed <= is_faster or (not held and not stands and not (is_as_fast and is_follower));
+  holds      <= word.loops when count /= bits + 2 else '0';
 
-  plan : entity work.position_plan
-    port map (clk => clk, rst => rst, in_valid => starts,
-              shaft_position => shaft_position, active => active, way => state.way, ahead => state.ahead,
-              position_target => position_target, move_speed => move_speed, move_step => move_step,
-              jerk_bits => jerk_bits, use_stops => use_stops, stop_low => stop_low, stop_high => stop_high,
-              out_valid => planned, jerk => jerk, advance => advance, last_sample => last_sample, still => still,
-              at_rest => at_rest);
+  with word.only select met <=
+    first and (part ?= lead)     when AT_LEAD,
+    is_active                    when ACTIVE,
+    is_still                     when STILL,
+    is_follower                  when FOLLOWS,
+    below                        when NEGATIVE,
+    not below                    when NOT_NEGATIVE,
+    moves                        when MOVING,
+    is_faster                    when FASTER,
+    is_slower                    when SLOWER,
+    is_faster or is_slower       when CHANGES,
+    goes_speed                   when GOES,
+    not (goes_speed or held)     when RESTS,
+    '1'                          when others;
+  puts      <= word.puts and met;
+  moves_acc <= word.acts and (met or word.puts);
+
+  which <= picked when word.m(2 downto 0) = X_PICKED else word.m(2 downto 0);
+  with to_integer(which) select x <=
+    turns_of(shaft_position)                                 when X_SHAFT,
+    turns_of(position_target)                                when X_PICKED,
+    turns_of(stop_low)                                       when X_LOW,
+    turns_of(stop_high)                                      when X_HIGH,
+    resize(p, WAY_W)                                         when X_PRODUCT,
+    signed(shift_left(resize(move_speed, WAY_W), SPEED_UP))  when X_SPEED,
+    signed(resize(move_step, WAY_W))                         when X_STEP,
+    shift_left(resize(coulomb, WAY_W), TO_PU)                when others;
+
+  narrow <= saturate(acc(WAY_W - 1 downto TO_INT), INTEGRAL_W);
 
   process (clk)
+    variable takes_x : std_logic;
+    variable less    : std_logic;
+    variable b      : acc_t;
+    variable sum    : signed(WAY_W + 1 downto 0);
+    variable does   : event_t;
   begin
     if rising_edge(clk) then
-      valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
-
-      p <= x * y;
-
-      -- Stages 21, 22: a += jerk;  v += a;  stage 23: v of torque_lead samples ago
-      if valid(20) = '1' then
-        state.a <= resize(state.a + jerk, V_W);
-        if planned = '1' then
-          state.ahead <= state.ahead + advance;
-          if still = '1' then
-            state.lead <= torque_lead;
+      -- The next word;  behind a sample's own words the plan's part, in the last eight samples of a section
+      count <= (others => '0');
+      if holds = '1' then
+        count <= count + 1;
+      else
+        word <= NO_WORD;
+        if in_valid = '1' or running = '1' then
+          word    <= WORDS(to_integer(pc));
+          pc      <= pc + 1;
+          running <= '1';
+          if WORDS(to_integer(pc)).ends = '1' then
+            if plans = '0' and left = 0 then
+              pc    <= BEGIN_AT(to_integer(part) + 1);
+              plans <= '1';
+            else
+              pc      <= (others => '0');
+              running <= '0';
+              plans   <= '0';
+              part    <= part + 1;
+              if part = 7 then
+                first <= '0';
+                left  <= left - 1;
+                if left = 0 then
+                  first <= '1';
+                  left  <= resize(shift_left(to_unsigned(1, 6), to_integer(bits)) - 1, 5);
+                end if;
+              end if;
+            end if;
           end if;
         end if;
-        state.phase <= state.phase + 1;
-        if state.phase = last_sample then
-          state.phase <= (others => '0');
-        end if;
-      end if;
-      if valid(21) = '1' then
-        state.v <= state.v + state.a;
-      end if;
-      if valid(22) = '1' then
-        past <= state.v & past(0 to 6);
-      end if;
-      v_used <= past(to_integer(state.lead));
-
-      -- Stage 25: the way, from where the shaft is while it is followed;  factors
-      if valid(24) = '1' then
-        state.ahead <= state.ahead - v_used;
-        state.way   <= state.way + v_used;
-        if active = '0' then
-          state.way <= shift_left(resize(shaft_position, WAY_W), SMALL) + v_used;
-        end if;
-        factor_v <= resize(round_half_up(v_used, POSITION_TRAJECTORY_V_DROP), FACTOR_W);
-        factor_a <= round_sat(state.a, POSITION_TRAJECTORY_A_DROP, FACTOR_W);
-
-        factor_now <= resize(round_half_up(state.v, POSITION_TRAJECTORY_V_DROP), FACTOR_W);
-        friction   <= negated(coulomb, state.v(V_W - 1));
-        if state.v = 0 then
-          friction <= (others => '0');
-        end if;
       end if;
 
-      -- Stages 26 to 31: k_speed*v, k_inertia*a and k_viscous*v, a half at a time
-      if valid(25) = '1' then
-        x            <= signed('0' & k_speed);
-        y            <= high(factor_v);
-        position_ref <= rounded(31 downto 0);
+      -- The adder
+      takes_x := '0';
+      if word.from = FROM_X or (word.from = FROM_WAY and is_active = '0') then
+        takes_x := '1';
       end if;
-      if valid(26) = '1' then
-        y <= low(factor_v);
+      case word.sign is
+        when PLUS          => less := '0';
+        when MINUS         => less := '1';
+        when IF_DOWN       => less := down;
+        when IF_NEGATIVE_V => less := v_below;
+        when IF_SLOWER     => less := is_slower;
+      end case;
+      b := memory(to_integer(word.m));
+      if word.m(4) = '0' and written(to_integer(word.m(3 downto 0))) = '0' then
+        b := (others => '0');
       end if;
-      if valid(27) = '1' then
-        x <= signed('0' & k_inertia);
-        y <= high(factor_a);
+      if takes_x = '1' then
+        b := x;
       end if;
-      if valid(28) = '1' then
-        y <= low(factor_a);
+      b   := b xor (b'range => less);
+      sum := (resize(acc, WAY_W + 1) & '1') + (resize(b, WAY_W + 1) & less);  -- the last bit carries in
+      if moves_acc = '1' then
+        case word.op is
+          when LEFT_3  => acc <= shift_left(acc, 3);
+          when RIGHT_3 => acc <= shift_right(acc, 3);
+          when RIGHT_2 => acc <= shift_right(acc, 2);
+          when ADD     =>
+            acc   <= sum(WAY_W downto 1);
+            below <= sum(WAY_W + 1);
+        end case;
       end if;
-      if valid(29) = '1' then
-        x <= signed('0' & k_viscous);
-        y <= high(factor_now);
+      if rst = '1' or (moves_acc and word.clears) = '1' then
+        acc   <= (others => '0');
+        below <= '0';
       end if;
-      if valid(30) = '1' then
-        y <= low(factor_now);
-      end if;
-
-      -- Stages 28 to 33: sums of the halves
-      if valid(27) = '1' or valid(29) = '1' or valid(31) = '1' then
-        sum <= shift_left(resize(p, SUM_W), HALF_W);
-      end if;
-      if valid(28) = '1' or valid(30) = '1' or valid(32) = '1' then
-        sum <= sum + p;
-      end if;
-
-      -- Stage 30: raw = k_speed*v;  stages 32, 34, 35: torque_ff
-      if valid(29) = '1' then
-        raw <= round_sat(sum, POSITION_TRAJECTORY_DROP_OMEGA, INTEGRAL_W);
-      end if;
-      if valid(31) = '1' then
-        by_inertia <= round_sat(sum, POSITION_TRAJECTORY_DROP_TORQUE, PU_W);
-      end if;
-      if valid(33) = '1' then
-        viscous <= round_sat(sum, POSITION_TRAJECTORY_DROP_VISCOUS, PU_W);
-      end if;
-      if valid(34) = '1' then
-        torque_ff <= saturate(resize(by_inertia, PU_W + 2) + viscous + friction, PU_W);
-        if active = '0' then
-          torque_ff <= (others => '0');
+      if puts = '1' then
+        memory(to_integer(word.put)) <= acc;
+        if word.put(4) = '0' then
+          written(to_integer(word.put(3 downto 0))) <= '1';
         end if;
       end if;
 
-      -- Stages 32 to 34: omega_ff += k_filter*(raw - omega_ff)
-      if valid(31) = '1' then
-        x <= resize(round_half_up(resize(raw, INTEGRAL_W + 1) - state.omega_ff, POSITION_TRAJECTORY_DROP_ERROR), 25);
-        y <= signed('0' & k_filter);
+      -- The multiplier: the lower half, then the upper one and the lower product
+      does    := word.does;
+      goes_on <= '0';
+      if goes_on = '1' then
+        p <= factor_x * factor_y + shift_right(p, HALF_W);
       end if;
-      if valid(33) = '1' then
-        state.omega_ff <= saturate(resize(state.omega_ff, 44) + round_half_up(p, POSITION_TRAJECTORY_DROP_FILTER),
-                                   INTEGRAL_W);
+      if does = LOWER_HALF then
+        p        <= (others => '0');
+        goes_on  <= '1';
+        of_error <= word.m(0) and word.m(1);
+        factor_y <= signed('0' & acc(DROP + HALF_W - 1 downto DROP));
+        if word.m(1 downto 0) = BY_FILTER then
+          factor_y <= signed('0' & acc(HALF_W - 1 downto 0));
+        end if;
+        case to_integer(word.m(1 downto 0)) is
+          when BY_INERTIA => factor_x <= signed('0' & k_inertia);
+          when BY_VISCOUS => factor_x <= signed('0' & k_viscous);
+          when BY_SPEED   => factor_x <= signed('0' & k_speed);
+          when others     => factor_x <= signed(resize(k_filter & '0', 25));
+        end case;
+      elsif does = UPPER_HALF then
+        goes_on  <= '1';
+        factor_y <= acc(DROP + HALF_W + 17 downto DROP + HALF_W);
+        if of_error = '1' then
+          factor_y <= narrow(INTEGRAL_W - 1 downto INTEGRAL_W - 18);
+        end if;
+      end if;
+
+      case does is
+        when SIGN_OF_V =>
+          v_below <= below;
+          moves   <= '1' when acc /= 0 else '0';
+        when POSITION_OUT =>
+          position_ref <= acc(WAY_W - 1 downto SMALL);
+        when TORQUE_OUT =>
+          torque_ff <= narrow(INTEGRAL_W - 1 downto INTEGRAL_W - PU_W);
+          if is_active = '0' then
+            torque_ff <= (others => '0');
+          end if;
+        when OMEGA_OUT =>
+          omega_ff <= narrow;
+        when PICK_HIGH =>
+          if use_stops = '1' and below = '0' then
+            picked <= to_unsigned(X_HIGH, 3);
+          end if;
+        when PICK_LOW =>
+          if use_stops = '1' and below = '1' then
+            picked <= to_unsigned(X_LOW, 3);
+          end if;
+        when SETTINGS =>
+          picked <= to_unsigned(X_PICKED, 3);
+          if is_still = '1' then
+            bits <= jerk_bits;
+            lead <= torque_lead;
+          end if;
+        when TURN =>
+          is_follower <= not is_active;
+          turned      <= stands and (acc(WAY_W - 1) xor down);
+          down        <= down xor (stands and (acc(WAY_W - 1) xor down));
+        when SPEED_FITS      => fits_speed   <= not below;
+        when FASTER_FITS     => fits_faster  <= not below;
+        when WAY_FITS        => fits_way     <= not below;
+        when FASTER_WAY_FITS => fits_further <= not below;
+        when SPEED_ZERO      => stands       <= '1' when acc = 0 else '0';
+        when PROFILE =>
+          busy    <= shift_left(busy, 1);
+          busy(0) <= '1' when acc /= 0 else '0';
+        when others          => null;
+      end case;
+
+      out_valid <= '0';
+      if age /= 0 then
+        age <= age + 1;
+        if age = LATENCY - 1 then
+          age       <= (others => '0');
+          out_valid <= '1';
+        end if;
+      end if;
+      if in_valid = '1' then
+        age <= to_unsigned(1, 6);
       end if;
 
       if rst = '1' then
-        valid(1 to LATENCY) <= (others => '0');
-        state               <= (phase => (others => '0'), lead => (others => '0'), a => (others => '0'),
-                                v => (others => '0'), ahead => (others => '0'), way => (others => '0'),
-                                omega_ff => (others => '0'));
-        past                <= (others => (others => '0'));
+        age       <= (others => '0');
+        out_valid <= '0';
+        pc        <= (others => '0');
+        running   <= '0';
+        plans     <= '0';
+        word      <= NO_WORD;
+        part      <= (others => '0');
+        left      <= (others => '0');
+        first     <= '1';
+        bits      <= (others => '0');
+        lead      <= (others => '0');
+        written   <= (others => '0');
+        picked    <= to_unsigned(X_PICKED, 3);
+        goes_on   <= '0';
+        down      <= '0';
+        stands    <= '1';
+        busy      <= (others => '0');
       end if;
     end if;
   end process;
 
-  omega_ff  <= state.omega_ff;
-  out_valid <= valid(LATENCY);
+  at_rest <= is_still;
 
 end architecture rtl;

@@ -102,7 +102,7 @@ package fluxproof_pkg is
     stop_high        : signed(31 downto 0);  -- soft end stop, turns of the shaft
     torque_lead      : unsigned(2 downto 0);  -- samples by which torque_ff precedes the position
     k_inertia        : unsigned(23 downto 0);  -- torque, or current, per turn and square of a sample
-    k_viscous        : unsigned(KP_W - 1 downto 0);  -- torque, or current, of viscous friction per turn and sample
+    k_viscous        : unsigned(23 downto 0);  -- torque, or current, of viscous friction per turn and sample
     coulomb          : signed(PU_W - 1 downto 0);  -- torque, or current, of Coulomb friction
     speed_kp         : unsigned(KP_W - 1 downto 0);  -- proportional gain
     speed_ki         : unsigned(KI_W - 1 downto 0);  -- integral gain times sample time
@@ -441,23 +441,16 @@ package fluxproof_pkg is
   constant POSITION_CONTROL_POSITION_W : natural := 32;
   constant POSITION_CONTROL_ERROR_W : natural := 18;
 
-  -- position_plan: none: docs/position.md
-  constant POSITION_PLAN_LATENCY : positive := 20;
-  constant POSITION_PLAN_WAY_W : natural := 58;
-  constant POSITION_PLAN_SMALL : natural := 26;
-  constant POSITION_PLAN_AHEAD_W : natural := 52;
-  constant POSITION_PLAN_PROFILE_W : natural := 35;
-
   -- position_trajectory: none: docs/position.md
-  constant POSITION_TRAJECTORY_LATENCY : positive := 36;
-  constant POSITION_TRAJECTORY_V_DROP : natural := 8;
-  constant POSITION_TRAJECTORY_A_DROP : natural := 2;
-  constant POSITION_TRAJECTORY_FACTOR_W : natural := 34;
-  constant POSITION_TRAJECTORY_DROP_OMEGA : natural := 20;
-  constant POSITION_TRAJECTORY_DROP_TORQUE : natural := 30;
-  constant POSITION_TRAJECTORY_DROP_VISCOUS : natural := 36;
-  constant POSITION_TRAJECTORY_DROP_ERROR : natural := 6;
-  constant POSITION_TRAJECTORY_DROP_FILTER : natural := 10;
+  constant POSITION_TRAJECTORY_LATENCY : positive := 52;
+  constant POSITION_TRAJECTORY_WAY_W : natural := 58;
+  constant POSITION_TRAJECTORY_SMALL : natural := 26;
+  constant POSITION_TRAJECTORY_BUSY_W : natural := 4;
+  constant POSITION_TRAJECTORY_DROP : natural := 9;
+  constant POSITION_TRAJECTORY_SPEED_UP : natural := 10;
+  constant POSITION_TRAJECTORY_LOW : natural := 17;
+  constant POSITION_TRAJECTORY_TO_PU : natural := 17;
+  constant POSITION_TRAJECTORY_TO_INTEGRAL : natural := 5;
 
   -- regeneration_limit: none: protection of the bus, docs/faults.md
   constant REGENERATION_LIMIT_LATENCY : positive := 1;
@@ -1144,6 +1137,10 @@ package fluxproof_pkg is
   constant DELTA_LAMBDA_DROP_FACTOR : natural := 17;
   constant DELTA_LAMBDA_FADE : natural := 4;
   constant DELTA_LAMBDA_N_MAX : natural := 12;
+
+  -- direction_current: none: docs/position.md
+  constant DIRECTION_CURRENT_LATENCY : positive := 7;
+  constant DIRECTION_CURRENT_MOST : natural := 90111;
 
   -- flux_compensation: 001, eq. (17): (K_p + K_i/s)*delta_lambda; the last term of eq. (16)
   constant FLUX_COMPENSATION_LATENCY : positive := 9;

@@ -70,6 +70,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "vsi_psi": (
         "inverter_loss",
         "magnet_flux",
+        "towards",
         "directions",
         "leg_compensation",
         "compensation_dq",
