@@ -29,6 +29,7 @@ entity fluxproof_hil is
     GATE_ACTIVE   : integer range 0 to 1         := 1;  -- level of gate_high and gate_low at which a switch is on
     TRIP_ACTIVE   : integer range 0 to 1         := 1;  -- level of trip that turns the gates off
     BRAKE_ACTIVE  : integer range 0 to 1         := 1;  -- level of brake at which the resistor is on
+    TRIP_FILTER   : integer range 0 to 1023      := 0;  -- longest pulse of trip without effect, clocks; 0: every pulse acts
     ENCODER       : integer range 0 to 3         := 0;  -- the kind of encoder, see above
     CURRENTS      : integer range 0 to 0         := 0;  -- codes
     SPI_LINES     : integer range 1 to 1         := 1  -- none is used
@@ -60,7 +61,7 @@ entity fluxproof_hil is
     m_axis_tready  : in  std_logic;
     m_axis_tlast   : out std_logic;
     sample_trigger : out std_logic;  -- middle of the zero vector: start the converters
-    trip           : in  std_logic;  -- asynchronous, TRIP_ACTIVE: gates off without a clock, remembered
+    trip           : in  std_logic;  -- asynchronous, TRIP_ACTIVE: gates off without a clock (see TRIP_FILTER), remembered
     gate_high      : out std_logic_vector(2 downto 0);  -- upper gates, bit 0 is leg a
     gate_low       : out std_logic_vector(2 downto 0);  -- lower gates, bit 0 is leg a
     brake          : out std_logic;  -- brake resistor on
@@ -663,7 +664,8 @@ begin
     generic map (
       GATE_ACTIVE  => GATE_ACTIVE,
       TRIP_ACTIVE  => TRIP_ACTIVE,
-      BRAKE_ACTIVE => BRAKE_ACTIVE
+      BRAKE_ACTIVE => BRAKE_ACTIVE,
+      TRIP_FILTER  => TRIP_FILTER
     )
     port map (
       clk            => aclk,
