@@ -16,7 +16,7 @@ from fluxproof.files import refuse_overwriting, write_json
 from fluxproof.quote import c_comment, put
 from fluxproof.stage import alone
 from golden_model import torque_table
-from golden_model.board_registers import board_generics, board_set, has_board
+from golden_model.board_registers import board_generics, board_set, has_board, pin_generics
 from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError
 from golden_model.generated.register_names import ADDRESSES
@@ -140,7 +140,7 @@ def torque_table_lines(result: RegisterSet) -> list[str]:
 
 def bases_lines(drive: Drive, result: RegisterSet) -> list[str]:
     """The SI values of 1.0 per unit, and the generics."""
-    bases, config = drive.bases, result.config._asdict()
+    bases, config = drive.bases, result.config._asdict() | pin_generics(drive)
     config |= board_generics(drive) if has_board(drive) else {}
     return [
         f"bases     {bases.current_a:g} A, {bases.voltage_v:g} V, {bases.omega_me_rad_s:g} rad/s electrical,"

@@ -51,6 +51,12 @@ def board_generics(drive: Drive) -> dict[str, int]:
     }
 
 
+def pin_generics(drive: Drive) -> dict[str, int]:
+    """The generics of every top beside the core's: the ring, the levels of the pins, the filter of the trip."""
+    names = ("ring_rows", "gate_active", "trip_active", "brake_active")
+    return {name: getattr(drive.core, name) for name in names} | {"trip_filter": drive.core.trip_filter_clocks}
+
+
 def spi_lines(drive: Drive) -> int:
     """Data lines: one for each current and the bus, or for two of them."""
     if drive.converters.kind != "spi":

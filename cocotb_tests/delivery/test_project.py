@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import pytest
 
@@ -185,6 +186,11 @@ def test_a_part_that_is_too_small_is_told(tmp_path, capsys):
     drive = DRIVES / "spindle_400v.toml"
     whole, plain = (need.need(load(drive), estimators) for estimators in (True, False))
     assert whole.dsp > need.DEVICES["xc7z010"].dsp >= plain.dsp
+    larger = load(drive)
+    larger = replace(
+        larger, core=replace(larger.core, position_loop=True, residual=True, references=True, ring_rows=42)
+    )
+    assert need.need(larger, False).dsp == plain.dsp + 5
     for part, words in (
         ("xc7z010clg400-1", f"needs about {whole}, xc7z010 has 80 DSP48 and 17,600 LUT: it does not fit"),
         ("xc7s15cpga196-1", "xc7s50 is large enough"),
@@ -206,6 +212,17 @@ def test_cells_are_those_that_were_counted():
         (need.REGISTERS, counts["xc7"]["registers_telemetry"]),
     ):
         assert cells == (row["lut"], row["dsp"])
+    told = {  # page, its sentences on the blocks of a key
+        "position_loop": ("position", r"`position_\w+` ([\d,]+) LUT,.*?(\d) DSP48"),
+        "references": ("speed_range", r"`torque_reference` alone, .*?: ([\d,]+) LUT, .*?(\d) DSP48"),
+        "residual": ("faults", r"The block takes ([\d,]+) LUT, .* (one) DSP48"),
+        "ring_rows": ("telemetry", r"of 42 rows \| (\d+), \d+, (\d) "),
+    }
+    for key, (page, sentence) in told.items():
+        found = re.findall(sentence, (ROOT / "docs" / f"{page}.md").read_text())
+        lut = sum(int(n.replace(",", "")) for n, _ in found)
+        dsp = 0 if key == "ring_rows" else sum(1 if n == "one" else int(n) for _, n in found)
+        assert found and need.OPTIONS[key] == (lut, dsp), key
     page = (ROOT / "docs" / "board.md").read_text()
     found = re.findall(r"^\| `(\w+_front)`, (.*?) \|(.*)\|$", page, re.MULTILINE)
     rows = {f"{front}, {kind}": cells for front, kind, cells in found}

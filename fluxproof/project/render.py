@@ -10,7 +10,7 @@ from typing import NamedTuple
 from fluxproof.print_registers import c_lines
 from fluxproof.project.parts import ZYNQ, Processor, processor_of
 from fluxproof.quote import c_comment, tcl_comment, tcl_word, vhdl_comment
-from golden_model.board_registers import board_generics, has_board
+from golden_model.board_registers import board_generics, has_board, pin_generics
 from golden_model.drive import Drive
 from golden_model.registers import RegisterSet
 
@@ -38,9 +38,7 @@ class Project(NamedTuple):
 def generics(drive: Drive, register_set: RegisterSet, hil: bool = False) -> dict[str, int]:
     """The generics of the top, by their names in the VHDL."""
     chosen = board_generics(drive) if has_board(drive) or hil else {}
-    levels = {name: getattr(drive.core, name) for name in ("ring_rows", "gate_active", "trip_active", "brake_active")}
-    levels["trip_filter"] = drive.core.trip_filter_clocks
-    named = register_set.config._asdict() | levels | chosen
+    named = register_set.config._asdict() | pin_generics(drive) | chosen
     return {"CLOCK_HZ": round(drive.core.clock_hz), **{name.upper(): value for name, value in named.items()}}
 
 
