@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 import os
 import re
 import sys
@@ -16,6 +17,7 @@ from fluxproof.checkout import ROOT, RTL
 from fluxproof.cosim import bench_plan, ghdl
 from fluxproof.cosim.stimulus import MEDIUM, samples
 from golden_model import registry
+from golden_model.control import current_limit
 from golden_model.registry import BLOCKS
 
 SEED = int(os.environ.get("FLUXPROOF_SEED", "1"))
@@ -64,6 +66,24 @@ def test_model_within_bound(block, config):
             worst[name] = max(worst.get(name, 0.0), abs(error) / max(allowed[name], 1e-30))
     if block.name != "pwm_compare":
         assert set(worst) >= {p.name for p in block.outputs if _is_quantity(p)}
+
+
+def test_a_block_with_quantities_has_a_reference():
+    """Where the sample is the clock the outputs are codes that were taken over; else a quantity has a float twin."""
+    missing = {
+        b.name for b in BLOCKS.values() if not b.clocked and not b.reference and any(map(_is_quantity, b.outputs))
+    }
+    assert missing == {"current_limit"}  # its outputs are those of the sample before: the next test
+
+
+def test_current_limit_is_the_circle():
+    """i_d within the circle exactly, i_q_max what is left of it within one LSB below."""
+    rng = np.random.default_rng(SEED)
+    for row in current_limit.stimuli(rng, {}):
+        state, _ = current_limit.step(current_limit.State(), **row)
+        i_d = max(-row["i_max"], min(row["i_max"], row["i_d_ref"]))
+        assert state.i_d == i_d
+        assert 0 <= math.sqrt(row["i_max"] ** 2 - i_d**2) - state.i_q_max < 1
 
 
 def _is_quantity(port) -> bool:

@@ -201,6 +201,77 @@ OUTPUTS = (
 )
 
 
+def _turned(v, state):
+    """(residual, the one turned by six times the angle, 0.0 where the sample does not count) as real numbers."""
+    turn = complex(v["cos_theta"], v["sin_theta"])
+    flux = turn * complex(FLUX.limit(v["model_d"]), FLUX.limit(v["model_q"]))
+    seen = []
+    for part, of in ((flux.real, "alpha"), (flux.imag, "beta")):
+        carried = state[0 if of == "alpha" else 1] * FLUX_STATE.lsb
+        seen.append(RESIDUAL.limit(FLUX_STATE.limit(part) + v["rho"] * v[f"i_{of}"] - carried))
+    used = state.known and v["run"] and not v["current_at_rail"]
+    error = turn.conjugate() * complex(*seen) if used else 0.0j
+    error = complex(RESIDUAL.limit(error.real), RESIDUAL.limit(error.imag))
+    return error, _limited(error * six_turns(turn), RESIDUAL), used
+
+
+def _limited(vector, fmt):
+    return complex(fmt.limit(vector.real), fmt.limit(vector.imag))
+
+
+def six_turns(turn):
+    """(cos + j sin)**6 by the double and the triple of the angle; only of a unit vector is it one."""
+    double = _limited(complex(2 * turn.real**2 - 1, 2 * turn.real * turn.imag), PU)
+    triple = _limited(turn * double, PU)
+    return _limited(complex(2 * triple.real**2 - 1, 2 * triple.real * triple.imag), PU)
+
+
+def reference(v, state):
+    error, sixth, used = _turned(v, state)
+    total = SUM.limit(abs(v["i_a"] + v["i_b"] + v["i_c"]))
+    current = min(length(*(PU.to_int(v[f"i_{x}"]) for x in "dq")), PU_HI)  # to decide is exact
+    speed = abs(PU.to_int(v["omega_me"]) + (v["omega_me"] < 0.0))
+    moved = current >= PU.to_int(v["residual_light"]) and speed >= PU.to_int(v["residual_slow"])
+    lsb = RESIDUAL.lsb
+    means = {
+        "residual_mean_d": (state.sum_d * lsb, error.real, used and moved),
+        "residual_mean_q": (state.sum_q * lsb, error.imag, used and moved),
+        "residual_sixth_d": (state.sum_sixth_d * lsb, sixth.real, used and moved),
+        "residual_sixth_q": (state.sum_sixth_q * lsb, sixth.imag, used and moved),
+        "residual_power": (state.sum_power * POWER.lsb, abs(error) ** 2, used and moved),
+        "residual_sum": (state.sum_sum * SUM.lsb, total, used),
+    }
+    out = {"residual_d": error.real, "residual_q": error.imag}
+    for name, (of_sum, value, counts) in means.items():
+        mean = of_sum / 2**MEAN
+        out[name] = (mean + (value - mean) / 2**MEAN if counts else mean) if v["run"] else 0.0
+    return out
+
+
+def bound(v, state):
+    """Each rounding by the gains that follow: the flux is cut, turned, compared and turned back, then averaged."""
+    turn = abs(v["cos_theta"]) + abs(v["sin_theta"])
+    axis = turn * FLUX.lsb + 1.5 * FLUX_STATE.lsb + RESIDUAL.lsb / 2
+    error = turn * axis + RESIDUAL.lsb  # and one LSB at the end of the range
+    found, _, _ = _turned(v, state)
+    double = TRIG.lsb / 2 + PU.lsb  # rounded, and one LSB at the end of the range
+    triple = turn * double + double
+    triple_of = turn * abs(_limited(complex(2 * v["cos_theta"] ** 2 - 1, 2 * v["cos_theta"] * v["sin_theta"]), PU))
+    six = 4 * min(triple_of, 3.0) * triple + 2 * triple**2 + double
+    sixth = 3 * error + 2 * abs(found) * six + 2 * error * six + RESIDUAL.lsb
+    power = 4 * abs(found) * error + 2 * error**2 + POWER.lsb
+
+    def mean(of, lsb, drop=0):  # the sum loses one LSB when it is cut, the output one of its own
+        return (of + lsb) / 2**MEAN + lsb / 2**drop
+
+    means = {"mean": mean(error, RESIDUAL.lsb), "sixth": mean(sixth, RESIDUAL.lsb)}
+    return (
+        {f"residual_{x}": error for x in "dq"}
+        | {f"residual_{name}_{x}": allowed for name, allowed in means.items() for x in "dq"}
+        | {"residual_power": mean(power, POWER.lsb), "residual_sum": mean(2 * SUM.lsb, SUM.lsb, MEAN - DROP_SUM)}
+    )
+
+
 def stimuli(rng, _config):
     """A motor that turns with small and large residuals, each limit met within an LSB, ends of every input, gaps."""
     rest = {p.name: 0 for p in INPUTS + REGISTERS} | {"run": 1, "voltage_known": 1, "cos_theta": TRIG_ONE}
@@ -284,7 +355,7 @@ BLOCK = Block(
         "DROP_SUM_I": DROP_SUM_I,
         "DROP_SUM": DROP_SUM,
     },
-    reference=None,
-    bound=None,
+    reference=reference,
+    bound=bound,
     stimuli=stimuli,
 )
