@@ -90,9 +90,10 @@ def check_encoder(drive):
     if e.kind in ("ssi", "biss", "endat"):
         waits = 0.0 if e.kind == "ssi" else e.start_s
         if not frame_s(drive) < drive.sample_time_s:
-            left = drive.sample_time_s - waits
+            left = drive.sample_time_s - waits - pause_s(drive)
             least = (frame_s(drive) - waits) * e.clock_hz / left if left > 0.0 else float("inf")
-            _refuse("[encoder] clock_hz", e.clock_hz, f"above {least:.6g} Hz: a frame must end within a PWM period")
+            allowed = f"above {least:.6g} Hz: a frame and a pause of {pause_s(drive):g} s must end within a PWM period"
+            _refuse("[encoder] clock_hz", e.clock_hz, allowed)
         rest, wanted = drive.sample_time_s - frame_s(drive), pause_s(drive)
         if rest < wanted:
             given = "" if e.pause_s is not None else f", ordinary for {e.kind},"

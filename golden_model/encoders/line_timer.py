@@ -50,7 +50,7 @@ class State(NamedTuple):
 @kernel
 def step(state, step_up, step_down, take, still, time_w):
     s = state
-    mask = (1 << time_w + SPAN_MORE) - 1
+    mask = (1 << (time_w + SPAN_MORE)) - 1
     edge = step_up or step_down
     up = 1 if step_up else 0
     turned = s.seen and edge and up != s.forward
@@ -63,15 +63,15 @@ def step(state, step_up, step_down, take, still, time_w):
     last = (s.last_0, s.last_1, s.last_2, s.last_3)
     base = (s.base_0, s.base_1, s.base_2, s.base_3)
     line_span, line_known, next_stamp, next_known = s.line_span, s.line_known, s.next_stamp, s.next_known
-    first, bit = fresh >> kind & 1, 1 << kind
+    first, bit = (fresh >> kind) & 1, 1 << kind
     since = last[kind] if first else base[kind]
     if edge:
         base_known = (base_known & ~bit) | (known & bit) if first else base_known
-        line_span, line_known = (s.now - since) & mask, base_known >> kind & 1
+        line_span, line_known = (s.now - since) & mask, (base_known >> kind) & 1
         known |= bit
         fresh &= ~bit
         following = (kind + way) % KINDS
-        next_stamp, next_known = last[following], known >> following & 1
+        next_stamp, next_known = last[following], (known >> following) & 1
     now = s.now
     return State(
         (now + 1) & mask,
@@ -142,9 +142,9 @@ BLOCK = Block(
     registers=(),
     outputs=(
         Port("line_span", Format(0, 26, 0), doc="clocks over the whole lines that the window's last edge ends"),
-        Port("line_known", BIT, doc="1: it is known"),
+        Port("line_known", BIT, doc="1: line_span is valid"),
         Port("next_span", Format(0, 26, 0), doc="clocks since the edge one line before the next one"),
-        Port("next_known", BIT, doc="1: it is known"),
+        Port("next_known", BIT, doc="1: next_span is valid"),
     ),
     state=State(),
     latency=1,
