@@ -165,12 +165,12 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
         state.of_snapshot, w.sample_valid, b.take_snapshot, w.encoder_code, w.position_code, w.encoder_count,
         w.encoder_flags, w.adc_a, w.adc_b, w.adc_c, w.adc_u_dc, adc_bits, position_bits,
     )  # fmt: skip
-    i = inputs
+    i, core_trip = inputs, 1 if w.board_stop or state.trip_2 else 0
     now = clocked.Inputs(
-        sample_valid=w.sample_valid, enable=i.enable, trip=1 if w.board_stop or state.trip_2 else 0,
+        sample_valid=w.sample_valid, enable=i.enable, trip=core_trip,
         clear_trip=w.core_clear, host_write=i.host_write, sample_faults=i.sample_faults, sample_trip=i.sample_trip,
         current_offset=i.current_offset, motion_faults=i.motion_faults, open_load=i.open_load,
-        encoder_lost=i.encoder_lost,
+        encoder_lost=i.encoder_lost, motor_differs=i.motor_differs,
         brake_asked=i.brake_asked, compare_a=i.compare_a, compare_b=i.compare_b, compare_c=i.compare_c,
     )  # fmt: skip
     core, entered, seen_core = clocked.step(state.of_core, now, regs, carrier_half)
