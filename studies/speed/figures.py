@@ -16,6 +16,7 @@ from fluxproof.checkout import DRIVES
 from fluxproof.cosim.golden_loop import simulate
 from fluxproof.plant import IMPOSED_SPEED, FluxMap, Machine, flux_from_currents, machine_params
 from golden_model import torque_table
+from golden_model.drive import Drive
 from golden_model.registers import registers
 from golden_model.units import to_si
 from studies.speed.drives import reluctance, saturated, scene, weakened
@@ -30,7 +31,7 @@ class Case:
     """A drive, its plant and the flux linkage that its table is made of."""
 
     name: str
-    drive: object
+    drive: Drive
     plant: Machine
     flux: Callable | None  # None: of the nameplate
     truth: Callable  # of the plant
