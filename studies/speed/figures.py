@@ -137,7 +137,7 @@ def loss(case: Case, plane: torque_table.Plane) -> Iterator[dict]:
             best = plane.most(np.inf)[1:]
         above.append(100.0 * ((i_d**2 + i_q**2) / (best[0] ** 2 + best[1] ** 2) - 1.0))
         wrong.append(100.0 * abs(torque - abs(level)) / top)
-    yield row(f"loss, {case.name}", "copper loss above the optimum, mean", np.mean(above), 0.3, "%")
+    yield row(f"loss, {case.name}", "copper loss above the optimum, mean", float(np.mean(above)), 0.3, "%")
     yield row(f"loss, {case.name}", "copper loss above the optimum, worst", np.max(above), 1.0, "%")
     yield row(f"torque, {case.name}", "asked against delivered, of the largest", np.max(wrong), 2.0, "%")
 
