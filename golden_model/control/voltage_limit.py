@@ -10,8 +10,8 @@ Room: the d axis has priority, but only within the voltage that remains beside t
 this the drive has a second stable point near the voltage limit, reached by a disturbance or a bus sag: u_d at its
 limit, no voltage for u_q, hence little flux, hence i_d far below its reference, hence u_d at its limit, braking with
 more than the rated current.  With it the q axis can always balance its EMF; below the limit nothing changes.
-With lambda_d < 0 and u_d at its upper end i_d is too low, weakened too far, and the EMF drives i_q towards zero, which is
-what frees voltage for u_d: a q axis that balances it would hold i_q, and u_d would lack the voltage that brings i_d
+With lambda_d < 0 and u_d at its upper end i_d is too low, weakened too far, and the EMF drives i_q towards zero, which
+is what frees voltage for u_d: a q axis that balances it would hold i_q, and u_d would lack the voltage that brings i_d
 back, the more the further i_d runs away.
 
 Radicands are formed as (u_max - u)*(u_max + u): exact, U(0,32), both factors below 2.  The root is never
