@@ -101,21 +101,22 @@ def test_above_base_speed_there_is_torque_within_the_circle_and_it_is_released()
 
 
 def test_weakened_too_far_the_d_axis_has_the_whole_circle():
-    """The voltage that the q axis' EMF needs is kept from u_d, unless lambda_d < 0: then i_d would run away."""
+    """The q axis' EMF has its voltage before u_d, unless lambda_d < 0 and u_d is at its upper end: i_d ran away."""
     u_max, emf = 40000, 30000
-    for lambda_d, room in ((1, math.isqrt(u_max**2 - emf**2)), (-1, u_max)):
-        state, _ = voltage_limit.step(voltage_limit.State(), 0, 0, 0, emf, 0, 0, u_max, lambda_d)
+    beside = math.isqrt(u_max**2 - emf**2)
+    for lambda_d, asked, room in ((1, 60000, beside), (-1, 0, beside), (-1, -60000, beside), (-1, 60000, u_max)):
+        state, _ = voltage_limit.step(voltage_limit.State(), asked, 0, 0, emf, 0, 0, u_max, lambda_d)
         _, (u_d, *_) = voltage_limit.step(state, 60000, 0, 0, emf, 0, 0, u_max, lambda_d)
         assert u_d == pytest.approx(room, abs=3)
 
 
 @pytest.mark.slow
 def test_demands_beyond_what_exists_while_the_bus_moves():
-    """A reluctance machine whose q axis keeps its EMF's voltage with lambda_d < 0 reaches 1.29 of its limit here."""
+    """A reluctance machine whose q axis kept its EMF's voltage with lambda_d < 0 ran away to 2.9 of its limit."""
     case = figures.cases()[1]
     plane = torque_table.Plane(case.truth, case.drive.machine.pole_pairs, case.drive.current_limit_a)
-    trips, peak, *_ = figures.hostile(case, plane, 1e-3, demands=20)
-    assert trips["ours"] == 0 and peak["ours"] < 1.15
+    trips, peak, *_ = figures.hostile(case, plane, 1e-3)
+    assert trips["ours"] == 0 and peak["ours"] < 1.6
 
 
 def test_estimate_is_right_from_the_start():

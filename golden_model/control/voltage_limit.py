@@ -3,15 +3,16 @@
 
     limit = min(u_max, room),  u_d = limit(u_pi_d + u_dec_d + u_comp_d, +-limit)
     u_q = limit(u_pi_q + u_dec_q + u_comp_q, +-sqrt(u_max**2 - u_d**2))
-    room = sqrt(u_max**2 - min(|u_dec_q|, u_max)**2)        for the next sample;  u_max where lambda_d < 0
+    room = sqrt(u_max**2 - min(|u_dec_q|, u_max)**2)        for the next sample;  u_max where lambda_d < 0 and sat_d = 1
     sat_x = -1, 0, +1: the active limit of the axis, for the anti-windup of the regulator
 
 Room: the d axis has priority, but only within the voltage that remains beside the EMF of the last sample.  Without
 this the drive has a second stable point near the voltage limit, reached by a disturbance or a bus sag: u_d at its
 limit, no voltage for u_q, hence little flux, hence i_d far below its reference, hence u_d at its limit, braking with
 more than the rated current.  With it the q axis can always balance its EMF; below the limit nothing changes.
-With lambda_d < 0, weakened too far, the EMF drives i_q towards zero, which is what frees voltage for u_d: a q axis that
-balances it would hold i_q, and u_d would lack the voltage that brings i_d back, the more the further i_d runs away.
+With lambda_d < 0 and u_d at its upper end i_d is too low, weakened too far, and the EMF drives i_q towards zero, which
+is what frees voltage for u_d: a q axis that balances it would hold i_q, and u_d would lack the voltage that brings i_d
+back, the more the further i_d runs away.
 
 Radicands are formed as (u_max - u)*(u_max + u): exact, U(0,32), both factors below 2.  The root is never
 above the true one, so the circle is never left.
@@ -48,7 +49,7 @@ def step(state, u_pi_d, u_pi_q, u_dec_d, u_dec_q, u_comp_d, u_comp_q, u_max, lam
     (u_q_max,) = sqrt.step((u_max - u_d) * (u_max + u_d))
     sat_q = side(sum_q, u_q_max)
     u_q = clamp(sum_q, -u_q_max, u_q_max)
-    emf = min(abs(u_dec_q), u_max) if lambda_d >= 0 else 0
+    emf = min(abs(u_dec_q), u_max) if lambda_d >= 0 or sat_d <= 0 else 0
     (room,) = sqrt.step((u_max - emf) * (u_max + emf))
     return State(room), (u_d, u_q, sat_d, sat_q)
 

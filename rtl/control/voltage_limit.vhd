@@ -2,11 +2,11 @@
 -- Purpose: adds decoupling and dead-time compensation, keeps the voltage in the circle of radius u_max, d axis first.
 --   limit = min(u_max, room),  u_d = limit(u_pi_d + u_dec_d + u_comp_d, +-limit)
 --   u_q = limit(u_pi_q + u_dec_q + u_comp_q, +-sqrt(u_max**2 - u_d**2))
---   room = sqrt(u_max**2 - min(|u_dec_q|, u_max)**2), for the next sample;  u_max where lambda_d < 0
+--   room = sqrt(u_max**2 - min(|u_dec_q|, u_max)**2), for the next sample;  u_max where lambda_d < 0 and sat_d = 1
 --   sat = -1, 0, +1: the active limit of the axis
 -- Room: the d axis has priority, but only within the voltage that remains beside the EMF of the last sample, so that
 -- the q axis can always balance its EMF.  Without it the drive has a second stable point at high speed; with it where
--- lambda_d < 0 i_d would run away, see the model.
+-- lambda_d < 0 and u_d at its upper end i_d would run away, see the model.
 -- Formats: sums exact; radicands (u_max - u)*(u_max + u) exact, U(0,32); PU out.
 -- Latency: 10; u_d is valid with out_soon.  Interval: 11 (room is ready one clock after the output).
 -- The q axis' inputs are needed a clock after the d axis'.
@@ -108,7 +108,7 @@ begin
       sum_q_2 <= resize(u_pi_q, SUM_W) + u_dec_q + u_comp_q;
       size_2  <= magnitude(u_dec_q);
       emf_3   <= resize(minimum(size_2, resize(u_max, PU_W)), U_MAX_W);
-      if lambda_d < 0 then
+      if lambda_d < 0 and sat_d = 1 then
         emf_3 <= (others => '0');
       end if;
 

@@ -16,6 +16,7 @@ from fluxproof.checkout import DRIVES
 from fluxproof.cosim.golden_loop import simulate
 from fluxproof.plant import IMPOSED_SPEED, FluxMap, Machine, flux_from_currents, machine_params
 from golden_model import torque_table
+from golden_model.drive import Drive
 from golden_model.registers import registers
 from golden_model.units import to_si
 from studies.speed.drives import reluctance, saturated, scene, weakened
@@ -30,7 +31,7 @@ class Case:
     """A drive, its plant and the flux linkage that its table is made of."""
 
     name: str
-    drive: object
+    drive: Drive
     plant: Machine
     flux: Callable | None  # None: of the nameplate
     truth: Callable  # of the plant
@@ -136,7 +137,7 @@ def loss(case: Case, plane: torque_table.Plane) -> Iterator[dict]:
             best = plane.most(np.inf)[1:]
         above.append(100.0 * ((i_d**2 + i_q**2) / (best[0] ** 2 + best[1] ** 2) - 1.0))
         wrong.append(100.0 * abs(torque - abs(level)) / top)
-    yield row(f"loss, {case.name}", "copper loss above the optimum, mean", np.mean(above), 0.3, "%")
+    yield row(f"loss, {case.name}", "copper loss above the optimum, mean", float(np.mean(above)), 0.3, "%")
     yield row(f"loss, {case.name}", "copper loss above the optimum, worst", np.max(above), 1.0, "%")
     yield row(f"torque, {case.name}", "asked against delivered, of the largest", np.max(wrong), 2.0, "%")
 
