@@ -78,7 +78,7 @@ def _variants(answer, effects) -> list[str]:
         return [f"Simulation and recording agree: {floor}."]
     if answer.verdict == "explained":
         return [f"{capital(what)}." for what in _named(answer, effects)]
-    named, sets = _named(answer, effects, brackets=True), _sets(answer.ambiguity, effects)
+    named, sets = _named(answer, effects, brackets=True), _sets(answer, effects)
     if answer.verdict == "ambiguous":
         if not answer.effects:
             return [f"This recording cannot separate {group}." for group in sets]
@@ -130,11 +130,13 @@ def _named(answer, effects, brackets=False) -> list[str]:
     return [*sized, joined([*first, *titles]), joined([*first, *few])]
 
 
-def _sets(groups, effects) -> list[str]:
-    """The ambiguities: all members of each set, the first two of each, and their number."""
-    titles = [[title_of(n, effects) for n in group] for group in groups]
+def _sets(answer, effects) -> list[str]:
+    """The ambiguities: all members with the sizes of each alone, all, the first two of each, and their number."""
+    alone = {e.name: said(e, effects, 1, brackets=True) for e in answer.alternatives}
+    sized = [[alone.get(n, title_of(n, effects)) for n in group] for group in answer.ambiguity]
+    titles = [[title_of(n, effects) for n in group] for group in answer.ambiguity]
     short = [t if len(t) < 4 else [*t[:2], f"{len(t) - 2} other effects"] for t in titles]
-    texts = ["; and ".join(joined(t) for t in each) for each in (titles, short)]
+    texts = ["; and ".join(joined(t) for t in each) for each in (sized, titles, short)]
     others = sum(map(len, titles)) - 1
     return [*texts, f"{titles[0][0]} and {others} other effect{'s' if others > 1 else ''}" if titles else ""]
 
