@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Slow logs, throttle runs and tables in which an angle or a voltage is late, or iron takes a current: one law each.
 
-    angle    i and u turned by exp(j omega tau), the angle being of an earlier instant
-    filter   u / (1 + j omega tau) of a voltage that was measured through a filter
-    iron     i with the current j omega psi / R_fe, which does not magnetise
+angle    i and u turned by exp(j omega tau), the angle being of an earlier instant
+filter   u / (1 + j omega tau) of a voltage that was measured through a filter
+iron     i with the current j omega psi / R_fe, which does not magnetise
 """
 
 from __future__ import annotations

@@ -20,13 +20,12 @@ from fluxproof.diagnosis.effects import (
     one,
     zero_vector_slope,
 )
-from fluxproof.plant.transforms import linear_limit
 
 TRIED, FINE = np.arange(-12, 13) / 50, 0.001  # periods after the valley
 OFF_VALLEY = 0.3  # periods by which currents may be sampled off the valley
 NEAR = 0.1  # periods between a skew and that of its ripple
 STEP = 0.002  # periods on both sides of an instant, over which the slope of the ripple is taken
-CLASS = 0.003  # of rated current
+RELEVANT_PERIODS = 0.012
 ROW = 1.5  # periods by which currents and angle may differ: a column that is written a row later than the others
 LATE = 0.5  # rad at the highest speed, by which an angle may be late: a filter's lag that a loop still runs with
 RIPPLE = 0.1  # share by which the ripple may be wrong: a filter of the currents rounds it
@@ -91,10 +90,8 @@ class SamplingSkew(MeasurementError, FreeCurve, Alternatives, Described):
         return 0.0012 * nominal.sample_time_s
 
     def relevant(self, nominal):
-        """By which the slope that the EMF gives the currents is the error of a sensor of class 0.3."""
-        m = nominal.machine
-        slope = linear_limit(nominal.inverter.dc_bus_v) / m.inductance_q_h
-        return max(super().relevant(nominal), CLASS * m.rated_current_a / slope)
+        """As of a delay of the voltage, which leaves the same on the d axis."""
+        return RELEVANT_PERIODS * nominal.sample_time_s
 
     def ceiling(self, nominal):
         return ROW * nominal.sample_time_s

@@ -26,7 +26,7 @@ from fluxproof.diagnosis.words.phrases import (
 
 ASSUMED = ("assumed_time",)  # codes of findings
 SENSOR = ("angle_step", "angle_drift", "angle_uneven")  # which a user has to mend, whatever else is found
-REASONS = (*ASSUMED, "gates_off", "repeated", "gap", "dropped", "stuck", "slow_sampling")
+REASONS = (*ASSUMED, "unit", "gates_off", "repeated", "gap", "dropped", "stuck", "slow_sampling")
 MOST_BESIDE = 2
 MOST_LETTERS = 200  # two lines of a terminal or of the report; only what the checks or the replay found may be longer
 
@@ -43,10 +43,16 @@ def _beside(answer) -> str:
     codes = REASONS if answer.verdict == "bad_recording" else ASSUMED
     if answer.verdict != "no_mismatch":  # which names what was corrected
         codes = (*SENSOR, *codes)
-    messages = (p.message.partition(":")[0] if p.code in SENSOR else p.message
-                for p in answer.problems if p.code in codes and not p.fatal)  # fmt: skip
+    messages = (_told(p) for p in answer.problems if p.code in codes and not p.fatal)
     found = dict.fromkeys(messages)
     return "".join(f" {capital(message)}." for message in list(found)[:MOST_BESIDE])
+
+
+def _told(problem) -> str:
+    """What a finding says in a headline: of a unit also which one was taken."""
+    if problem.code == "unit":
+        return f"{problem.message} ({problem.action})"
+    return problem.message.partition(":")[0] if problem.code in SENSOR else problem.message
 
 
 def _guessed(answer) -> str:
