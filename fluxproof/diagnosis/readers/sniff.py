@@ -86,7 +86,8 @@ def sniff(path) -> Layout:
     candidates = (_candidate(lines, separator, decimal) for separator in SEPARATORS for decimal in ".,")
     score, separator, decimal, first, width = max(candidates, key=lambda c: c[0])
     if score <= 0:
-        raise RecordingError(f"{path}: no row of numbers in the first {len(lines)} lines; a table was expected")
+        json = "; JSON is not read: write a column for each signal" if head.lstrip()[:1] in (b"{", b"[") else ""
+        raise RecordingError(f"{path}: no row of numbers in the first {len(lines)} lines; a table was expected{json}")
     names, units = _header(lines[:first], separator, width)
     above = _without_rest(split(lines[first - 1], separator), width) if first else []
     if names[0] == "1" and len(above) > 2 and all(above) and separator != " ":
