@@ -54,7 +54,7 @@ def _ripples(view):
     """
     sampled = view.locked[:, None]
     if not sampled.any():
-        return dict.fromkeys(("pulses", "shift"), np.zeros_like(view.i))
+        return {"pulses": np.zeros_like(view.i), "shift": np.zeros_like(view.i)}
     period = view.sample_time_s
     at = instant(view, "off_valley", TRIED, FINE, _seen)
     step = off_valley(view, at + STEP) - off_valley(view, at - STEP)
