@@ -12,11 +12,11 @@ from pathlib import Path
 
 from fluxproof.checkout import BUILD
 from fluxproof.files import write_json
-from studies.brought import angles, legs, limits, moving
+from studies.brought import angles, late, legs, limits, moving
 from studies.scored.study import print_counts, scored, write_page
 from studies.scored.truth import JUDGES
 
-ROOMS = (moving, limits, angles, legs)
+ROOMS = (moving, late, limits, angles, legs)
 
 
 def by_kind(result: dict) -> list[str]:

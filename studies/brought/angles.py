@@ -70,7 +70,6 @@ CAUSES = {
     "slip": Cause(reading=STEP, words=STEP),
     "counts": Cause(reading=DRIFT, words=DRIFT),
     "hall": Cause(("encoder_eccentricity",), reading=HALL, words=HALL),
-    "lag": Cause(("delay",), may=("sampling_skew", "iron_loss")),
 }
 
 
@@ -79,10 +78,14 @@ def _case(base: str, form: str, name: str) -> Case:
         columns = FORMS[form](base)
         return turned(base, form, _error(name, BASES[base], columns, rng))
 
-    kind = name.partition("_")[0]
+    kind, causes = name.partition("_")[0], [cause for key, cause in CAUSES.items() if name.startswith(key)]
+    if kind == "lag":
+        late = LATE / BASES[base].omega
+        sizes = {"skew_s": (0.95 * late, 1.05 * late)}
+        causes = [Cause(("sampling_skew",), sizes, ("delay", "iron_loss"))]
     rng = np.random.default_rng(list(f"angle {base} {form} {name}".encode()))
     log = make(rng)
-    mishap = Mishap(name, form, lambda log: log, tuple(c for k, c in CAUSES.items() if k == kind))
+    mishap = Mishap(name, form, lambda log: log, tuple(causes))
     truth = mishap.truth(base, log.drive)
     return Case(f"angle_{kind}.{base}_{form}_{name}", truth, log.written)
 

@@ -16,6 +16,9 @@ from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.ground.machine import steady_voltage
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import RecordingError, from_columns
+from fluxproof.diagnosis.loading.load import load_recording
+from fluxproof.diagnosis.session import diagnose
+from studies.brought import late
 from studies.brought.drives import FOLDER, drive_of, true_machine
 from studies.brought.motion import Logger, logged, ride
 from studies.brought.moving import GAIT, THROTTLE
@@ -141,3 +144,15 @@ def test_held_messages_are_not_balanced_in_motion():
         held = recording[name]
         recording.columns[name] = held[np.arange(len(held)) // 10 * 10]
     assert stretches_in_motion(recording, nominal) is None
+
+
+@pytest.mark.parametrize("kind, name", [("angle", "sampling_skew"), ("filter", "delay"), ("iron", "iron_loss")])
+def test_operating_points_show_what_is_late(kind, name, tmp_path):
+    """All three follow omega^2 on the d axis; a late angle and a late voltage were unknown in a table."""
+    (chosen,) = [c for c in late.cases() if c.name == f"late.drone_24v_table_{kind}"]
+    (recording,), drive = chosen.files(tmp_path)
+    nominal = load_nominal(drive)
+    answer = diagnose(load_recording(recording, nominal), nominal)
+    ((key, (low, high)),) = chosen.truth.causes[0].sizes.items()
+    assert [e.name for e in answer.effects] == [name] and not answer.ambiguity, answer.sentence
+    assert low < answer.effects[0].parameters[key].value < high

@@ -28,10 +28,10 @@ def view():
     return view_of(recorded(), NOMINAL)
 
 
-def test_an_angle_may_be_a_row_late_and_currents_not(view):
+def test_an_angle_may_be_late_by_rows_and_currents_not(view):
     """It was told as a delay of the voltage, and a winding of which the resistance rises by two thirds."""
-    too_large, row = CATALOGUE["sampling_skew"].too_large, view.sample_time_s
-    assert not too_large({"tau": 0.0, "angle": -row}, view) and too_large({"tau": 0.0, "angle": -2.0 * row}, view)
+    too_large, row, most = CATALOGUE["sampling_skew"].too_large, view.sample_time_s, 0.5 / view.top_speed
+    assert not too_large({"tau": 0.0, "angle": -0.9 * most}, view) and too_large({"angle": -1.1 * most}, view)
     assert too_large({"tau": 0.5 * row, "angle": 0.0}, view) and not too_large({"tau": 0.2 * row}, view)
 
 

@@ -148,3 +148,9 @@ def test_a_new_file_is_a_new_effect(tmp_path, monkeypatch):
     assert answer.verdict == "explained" and [e.name for e in answer.effects] == ["second_harmonic"], summary(answer)
     # Equal a_d cos and a_q sin are one forward-rotating harmonic.
     assert answer.effects[0].parameters["order_2"].value == pytest.approx(0.01, rel=0.1)
+
+
+def test_a_recording_with_torque_is_not_asked_for_a_transducer():
+    """A dyno sheet was told to record what its first column had."""
+    assert "transducer" in CATALOGUE["current_scale"].experiment(torque=False)
+    assert [e.name for e in CATALOGUE.values() if "transducer" in e.experiment(torque=True)] == []

@@ -114,6 +114,19 @@ BENCHES = {  # header: canonical column, and how much larger its values are
         "Drehzahl (1/min)": ("omega_e", 60 / 8 / np.pi), "Vd [V]": ("u_d_ref", 1.0), "Vq [V]": ("u_q_ref", 1.0),
         "Channel D (Vdc)": ("u_dc", 1.0),
     },
+    "Simulink": {
+        "xAxis [s]": ("t", 1.0), "id_meas": ("i_d", 1.0), "iq_meas": ("i_q", 1.0),
+        "wm_rpm": ("omega_e", 60 / 8 / np.pi),
+        "vd_ref": ("u_d_ref", 1.0), "vq_ref": ("u_q_ref", 1.0), "Vdc": ("u_dc", 1.0),
+    },
+    "LabVIEW": {
+        "X_Value": ("t", 1.0), "Id": ("i_d", 1.0), "Iq": ("i_q", 1.0), "omega_m (rad/s)": ("omega_e", 1 / 4),
+        "Vd": ("u_d_ref", 1.0), "Vq": ("u_q_ref", 1.0), "Vbus": ("u_dc", 1.0),
+    },
+    "electrical": {
+        "elapsed": ("t", 1.0), "Id": ("i_d", 1.0), "Iq": ("i_q", 1.0), "f_el (Hz)": ("omega_e", 0.5 / np.pi),
+        "Vd": ("u_d_ref", 1.0), "Vq": ("u_q_ref", 1.0), "Vbus": ("u_dc", 1.0),
+    },
 }  # fmt: skip
 
 
@@ -127,6 +140,16 @@ def test_usual_names_of_dq_logs(tmp_path, nominal, bench):
         np.testing.assert_allclose(recording[name], table[name], rtol=1e-9, atol=1e-9)
     (note,) = (note for note in recording.meta["notes"] if "usual names" in note)
     assert all(f"from {header!r}" in note for header in raw)
+
+
+def test_a_known_log_without_its_voltages_has_those_with_usual_names(tmp_path, nominal):
+    table = dq_made()
+    names = {"t": "ms_today", "i_d": "d_axis_current", "i_q": "q_axis_current", "omega_e": "erpm", "u_d_ref": "vd",
+             "u_q_ref": "vq"}  # fmt: skip
+    raw = {names[n]: table[n] * {"t": 1e3, "omega_e": 30 / np.pi}.get(n, 1.0) for n in names}
+    recording = load_recording(write(tmp_path / "log.csv", raw, sep=";"), nominal)
+    for name in ("i_q", "omega_e", "u_d_ref", "u_q_ref"):
+        np.testing.assert_allclose(recording[name], table[name], rtol=1e-9, atol=1e-9)
 
 
 def test_usual_names_of_phases_and_torque(tmp_path, nominal):
@@ -312,6 +335,7 @@ REFUSED = {
     "no voltages": ("t i_d i_q omega_e", "u_q_ref alone would show R and flux.*dyno sheet"),
     "one axis": ("t i_q u_d_ref u_q_ref omega_e", "i_d would show L_d and the angle"),
     "no speed": ("t i_d i_q u_d_ref u_q_ref", "omega_e would show steady effects"),
+    "scope": ("TIME CH1 CH2 CH3 CH4", "CH1, CH2, CH3, CH4 are channels of an instrument.*--column CH1=u_ab"),
     "instrument": ("t Dev1_ai0", "'Dev1_ai0' may be terminal voltages.*--column 'Dev1_ai0=u_ab'"),
     "two probes": ("t ai0 ai1", "--column 'ai0=u_ab' --column 'ai1=u_bc'"),
     "supply": ("t i_dc u_dc", "supply alone show nothing.*EMF run"),

@@ -58,6 +58,27 @@ def test_the_message_is_that_of_the_complete_run(missing, tmp_path):
     assert refused(path, nominal) == str(late.value)
 
 
+FOREIGN = {  # name: content, what the refusal says
+    "prose.csv": (b"no numbers\n" * 50, "no row of numbers in the first 50 lines"),
+    "log.json": (b'{"t": [0, 1], "i_q": [1, 2]}\n', "unknown format|JSON is not read"),
+    "log.txt": (b'{"t": 0, "i_q": 2}\n' * 20, "JSON is not read: write a column for each signal"),
+    "sheet.xlsx": (b"PK\x03\x04" + bytes(60), "an Excel workbook: unpack it, or save the sheet as CSV"),
+    "log.csv": (b"\x1f\x8b\x08" + bytes(60), "compressed by gzip: unpack it"),
+    "run.tdms": (b"TDSm" + bytes(60), "TDMS of LabVIEW: export it as CSV"),
+}
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_a_foreign_file_is_refused_at_once(name, tmp_path):
+    content, says = FOREIGN[name]
+    nominal, path = nominal_of(tmp_path), tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=says) as late:
+        load_recording(path, nominal)
+    if name != "log.json":  # the text of a name that claims no format is for the reader
+        assert refused(path, nominal) == str(late.value)
+
+
 @pytest.mark.parametrize("columns", ['"nowhere" = "i_a"\n"t" = "t"\n', '"t" = {name = "t", unit = "parsec"}\n'])
 def test_the_message_of_a_wrong_entry(columns, tmp_path):
     nominal, path = nominal_of(tmp_path, columns), write(tmp_path / "r.csv", made(400))
@@ -79,12 +100,9 @@ def test_what_a_diagnosis_can_use_or_judges_itself_passes(tmp_path):
     nominal = nominal_of(tmp_path)
     good, poor = write(tmp_path / "good.csv", made(400)), write(tmp_path / "poor.csv", without(made(400), "i_a"))
     empty, table = tmp_path / "empty.csv", write(tmp_path / "r.parquet", without(made(400), "i_a"))
-    prose = tmp_path / "prose.csv"
-    prose.write_text("no numbers\n" * 50)
     refuse_early([good], nominal.path)
     refuse_early([good, poor], nominal.path)  # a part that is no good is left out
     refuse_early([table], nominal.path)
-    refuse_early([prose], nominal.path)
     empty.write_text("")
     assert "empty" in refused(empty, nominal)
     with pytest.raises(RecordingError, match="none.csv: cannot be read"):

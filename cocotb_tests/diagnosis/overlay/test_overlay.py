@@ -104,6 +104,16 @@ def test_improved_drive_reproduces_the_recording(name, healthy, tmp_path):
         assert all(len(v) == len(data["t"]) and np.isfinite(v).all() for v in data[run].values())
 
 
+def test_a_late_angle_is_that_of_an_earlier_instant(healthy, tmp_path):
+    """The recording has an angle that is 0.4 ms old; with it in the drive file the simulation meets the voltages."""
+    nominal, own = healthy
+    columns = {**own.columns, "theta_e": own["theta_e"] - 4e-4 * own["omega_e"]}
+    improved = write_improved(nominal, [effect({"timing.angle_delay_s": 4e-4})], tmp_path / "improved.toml")
+    data = closed_loop(from_columns(columns, 1e-4), nominal, improved)
+    before, after = (np.hypot(data[run]["u_d_ref"], data[run]["u_q_ref"]) for run in ("rms_before", "rms_after"))
+    assert before > 1.5 * after
+
+
 def typical(data):
     return np.median(np.abs(data["simulated_before"]["u_q_ref"] - data["recorded"]["u_q_ref"]))
 

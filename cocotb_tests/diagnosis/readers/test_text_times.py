@@ -10,6 +10,7 @@ import pytest
 from cocotb_tests.support.recordings.from_equations import T, as_text, codes, made, nominal_of
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.loading.load import load_recording
+from fluxproof.diagnosis.readers.sniff import sniff
 from fluxproof.diagnosis.readers.text import read
 
 
@@ -41,6 +42,8 @@ def stamped(table, start, form, name="t", decimal="."):
         ("%H:%M:%S.%f", "t", "."),
         ("%H:%M:%S.%f", "t [hh:mm:ss]", ","),
         ("%H:%M:%S.%f", "t [ms]", "."),
+        ("%Y/%m/%d %H:%M:%S.%f", "DateTime", "."),
+        ("%m/%d/%Y %I:%M:%S.%f %p", "DateTime", "."),
     ],
 )
 def test_dates_and_clock_times_are_seconds(tmp_path, nominal, table, form, name, decimal):
@@ -50,6 +53,38 @@ def test_dates_and_clock_times_are_seconds(tmp_path, nominal, table, form, name,
     assert codes(recording) == [] and recording.joined[:-1].all()
     np.testing.assert_allclose(recording["t"], table["t"], atol=1.1e-6)
     assert any("clock times" in note for note in recording.meta["notes"])
+
+
+def test_a_timetable_of_matlab_has_seconds_in_words(tmp_path, nominal, table):
+    lines = as_text(table, ",", ".").splitlines()
+    time = ["Time", *(f"{t:.6g} sec" for t in table["t"])]
+    at = lines[0].split(",").index("t")
+    rows = [
+        ",".join([t, *(v for k, v in enumerate(line.split(",")) if k != at)])
+        for t, line in zip(time, lines, strict=True)
+    ]
+    (tmp_path / "r.csv").write_text("\n".join(rows) + "\n")
+    recording = load_recording(tmp_path / "r.csv", nominal)
+    assert codes(recording) == []
+    np.testing.assert_allclose(recording["t"], table["t"], atol=1e-9)
+
+
+HEADS = {  # lines above the numbers: names and units found
+    "a scope": ("x-axis,1,2\nsecond,Volt,Ampere\n", ",", ["x-axis", "1", "2"], ["second", "Volt", "Ampere"]),
+    "a preamble": ("Sample Interval,1e-05,\n\nTIME,CH1,CH2,\n", ",", ["TIME", "CH1", "CH2"], ["", "", ""]),
+    "LabVIEW": ("***End_of_Header***\t\nX_Value\tId [A]\tn [rpm]\tComment\n", "\t",
+                ["X_Value", "Id [A]", "n [rpm]"], ["", "", ""]),
+    "no header": ("", ";", ["1", "2", "3"], ["", "", ""]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", HEADS)
+def test_headers_of_instruments(tmp_path, kind):
+    head, separator, names, units = HEADS[kind]
+    rows = "".join(separator.join((f"{k}e-5", "0.5", f"{k}.25")) + "\n" for k in range(40))
+    (tmp_path / "r.csv").write_text(head + rows)
+    layout = sniff(tmp_path / "r.csv")
+    assert (layout.names, layout.units, layout.first) == (names, units, head.count("\n"))
 
 
 def test_timestamps_of_parquet(tmp_path, nominal, table):

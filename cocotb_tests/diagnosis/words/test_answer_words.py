@@ -148,9 +148,9 @@ def test_a_headline_says_what_and_how_large():
 @pytest.mark.parametrize(
     "name, key, periods, says, then",
     [
-        ("delay", "delay_s", -1.0, "earlier by 0.1000 +-", "Earlier by one sample: [control] duty_applied_after"),
+        ("delay", "delay_s", -1.0, "recorded late by 0.1000 +-", "Recorded late by one sample: [control] duty_"),
         ("delay", "delay_s", 0.27, "later by 27.00 +-", None),
-        ("sampling_skew", "skew_s", -0.042, "before the angle by 4.20 +-", None),
+        ("sampling_skew", "skew_s", -0.042, "angle early by 4.20 +-", None),
     ],
 )
 def test_a_time_is_early_or_late_and_has_no_sign(name, key, periods, says, then):

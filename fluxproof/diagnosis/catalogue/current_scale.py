@@ -60,6 +60,7 @@ EFFECT = CurrentScale(
     equation="i_measured = (1 + s) i",
     signature="R, L_d and L_q wrong by the same factor",
     separated_by="an external ammeter or a torque transducer",
+    beside_torque="an external ammeter, or an EMF run without current, which measures the flux",
     parameters=(Parameter("scale", "1", "relative error of all phases", "error"),),
     plausible={"scale": (-0.1, 0.1)},
     otherwise="rms values in place of peak values, or the scale of another range of the sensors",

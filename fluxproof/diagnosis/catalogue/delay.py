@@ -7,6 +7,9 @@ ripple; orders 3 and 6 show which.  As long as the samples stay in the zero vect
 so that usual gate drivers are harmless.  Around the delay of the recording the effect is linear: a chord as its
 formula, a tangent, the tangent of the ripple alone (a filter in front of the converters delays it), and the share of
 the torque's ripple that a transducer does not show.
+
+At operating points there is no ripple.  A voltage that was measured through a filter is late as well, u / (1 + j omega
+tau), and smaller by half of (omega tau)^2: the loss is a curve beside the delay.
 """
 
 import numpy as np
@@ -15,21 +18,25 @@ from fluxproof.diagnosis.balance.curves import parabola
 from fluxproof.diagnosis.balance.late_pulses import instant, late_ripple
 from fluxproof.diagnosis.balance.shaft import SHOWN
 from fluxproof.diagnosis.effects import (
+    DOUBT,
     Alternatives,
     FreeCurve,
     MeasurementError,
     Parameter,
     current_error,
     one,
+    sigma,
     torque_of,
     voltage,
 )
+from fluxproof.plant.transforms import linear_limit
 
 MOST_PERIODS = 3.0  # periods; more than is possible, so that the iteration can return
 TRIED, FINE = np.arange(1, 50) / 50, 0.002  # periods, of late pulses
 NEAR = 0.15  # periods between a delay and that of its ripple: about a zero vector
 STEP = 0.005  # periods on both sides of a delay, over which the slope of the ripple is taken
 RIPPLE = 0.1  # share by which the ripple may be wrong: a filter of the currents rounds it
+LATE = 0.5  # rad at the highest speed, of a voltage that a filter makes late
 COUNT = "duty_applied_after_samples"
 TIMES = ("tau", "gates", "shift")  # coefficients whose sum is the delay
 
@@ -94,13 +101,17 @@ def _error(view, c):
 
 
 class Delay(MeasurementError, FreeCurve, Alternatives):
-    one_of = (("tau",), ("gates", "shift", "filter", "torque"))
+    one_of = (("tau", "loss"), ("gates", "shift", "filter", "torque"))
 
     def core(self, view):
         late = -view.to_dq(_moved(view, 1.0)[:, 1:-1]) / view.sample_time_s
+        if not view.locked.any():
+            return {"tau": voltage(late)}
         return {"tau": voltage(late), "gates": self._pulses(view, late, "gates")}
 
     def free(self, view):
+        if not view.locked.any():
+            return {"loss": voltage(-(view.omega_mid**2) * view.to_dq(_smooth(view)[:, 1:-1]))}
         late = -view.to_dq(_moved(view, 1.0)[:, 1:-1]) / view.sample_time_s
         ripple = current_error(view, _ripples(view)["shift"])
         out = {"shift": self._pulses(view, late, "shift")}
@@ -129,15 +140,32 @@ class Delay(MeasurementError, FreeCurve, Alternatives):
         """The ripple is that of another delay: its columns fit something else."""
         late = _time(c) / view.sample_time_s
         other = c.get("gates") and not (0.0 < late < 1.0 and abs(late - view.memo["late_pulses"]) < NEAR)
-        return bool(other) or super().too_large(c, view)
+        most = self.ceiling(view.nominal)
+        if not view.locked.any():
+            most = max(most, LATE / max(view.top_speed, 1e-9))
+        return bool(other) or abs(_time(c)) > most
+
+    def possible(self, c, covariance, nominal):
+        """A filter takes away amplitude and adds none."""
+        loss = list(c).index("loss") if "loss" in c else None
+        return loss is None or c["loss"] >= -DOUBT * sigma(covariance, loss)
+
+    def curve_scale(self, key, cores, nominal):
+        """A loss is that of a filter where it is half of the square of the angle."""
+        per_speed = nominal.machine.magnet_flux_wb / linear_limit(nominal.inverter.dc_bus_v)
+        return super().curve_scale(key, cores, nominal) * (per_speed if key == "loss" else 1.0)
 
     def doubt(self, c, view):
         seen = current_error(view, _error(view, c))["u"]
         return RIPPLE * np.sqrt(np.mean(np.abs(seen) ** 2, axis=1))
 
     def corrected(self, view, c):
-        late = float(np.clip(_time(c) / view.sample_time_s, -MOST_PERIODS, MOST_PERIODS))
+        most = max(MOST_PERIODS, 0.0 if view.locked.any() else LATE / (view.top_speed * view.sample_time_s))
+        late = float(np.clip(_time(c) / view.sample_time_s, -most, most))
         moved, error = view.replace(u=view.u + _moved(view, late)), _error(view, c)
+        if c.get("loss"):
+            kept = 1.0 - np.clip(c["loss"] * view.omega[:, :1] ** 2, -LATE, LATE)
+            return moved.replace(u=moved.u / kept)
         if not error.any():
             return moved
         torque = torque_of(view, view.inductances(error), view.i - error) + torque_of(view, view.psi, error)
@@ -162,6 +190,6 @@ EFFECT = Delay(
     equation="u(t) = u_recorded(t - tau)",
     signature="order 0: the whole voltage vector rotated by omega tau; orders 3 and 6 of late gates",
     separated_by="two speeds, both directions; load at each; a step",
-    parameters=(Parameter("delay_s", "s", f"beyond {COUNT}", "later by", "earlier by", COUNT),),
-    needs=("samples", "inverter"),
+    parameters=(Parameter("delay_s", "s", f"beyond {COUNT}", "later by", "recorded late by", COUNT),),
+    needs=("inverter",),
 )

@@ -83,6 +83,7 @@ EFFECT = Friction(
     equation="T_shaft = T_airgap - B omega_m - T_c sign(omega_m)",
     signature="torque against the motion, odd in speed, at every load",
     separated_by="a torque transducer, or a no-load coast-down in both directions",
+    beside_torque="the drag over speed with and without a negative i_d, which only an iron loss follows",
     parameters=(
         Parameter("viscous_friction_nms", "Nm s", "per mechanical rad/s", "viscous"),
         Parameter("coulomb_friction_nm", "Nm", "dry", "dry"),

@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Currents are sampled tau after the middle of the zero vector: the EMF gives them a slope, the pulses a ripple."""
+"""Currents and angle are of different instants: the currents off the valley, or an angle that a filter makes late.
+
+Currents that are sampled tau after the middle of the zero vector have the slope that the EMF gives them, and the ripple
+of the pulses.  An angle that is late by tau, from an observer, a filter or an older message, turns all dq values by
+omega tau.  At operating points there are no pulses, and both follow omega^2 psi tau.
+"""
 
 import numpy as np
 
@@ -15,13 +20,14 @@ from fluxproof.diagnosis.effects import (
     one,
     zero_vector_slope,
 )
-from fluxproof.plant.transforms import linear_limit
 
 TRIED, FINE = np.arange(-12, 13) / 50, 0.001  # periods after the valley
+OFF_VALLEY = 0.3  # periods by which currents may be sampled off the valley
 NEAR = 0.1  # periods between a skew and that of its ripple
 STEP = 0.002  # periods on both sides of an instant, over which the slope of the ripple is taken
-CLASS = 0.003  # of rated current
-ROW = 1.5  # periods by which an angle may be late: a column that is written a row later than the others
+RELEVANT_PERIODS = 0.012
+ROW = 1.5  # periods by which currents and angle may differ: a column that is written a row later than the others
+LATE = 0.5  # rad at the highest speed, by which an angle may be late: a filter's lag that a loop still runs with
 RIPPLE = 0.1  # share by which the ripple may be wrong: a filter of the currents rounds it
 # Weights of the coefficients in the time by which the currents are later than the angle.
 WEIGHTS = {"tau": 1.0, "pulses": 1.0, "shift": 1.0, "filter": 0.0, "angle": -1.0}
@@ -42,11 +48,18 @@ def _seen(view, at):
 
 
 def _ripples(view):
-    """Current (b, m+1) of the pulses per second of skew: chord up to the instant of the recording, tangent there."""
+    """Current (b, m+1) of the pulses per second of skew: chord up to the instant of the recording, tangent there.
+
+    Operating points have no pulses.
+    """
+    sampled = view.locked[:, None]
+    if not sampled.any():
+        return {"pulses": np.zeros_like(view.i), "shift": np.zeros_like(view.i)}
     period = view.sample_time_s
     at = instant(view, "off_valley", TRIED, FINE, _seen)
     step = off_valley(view, at + STEP) - off_valley(view, at - STEP)
-    return {"pulses": off_valley(view, at) / (at * period or 1.0), "shift": step / (2.0 * STEP * period)}
+    chord = off_valley(view, at) / (at * period or 1.0)
+    return {"pulses": chord * sampled, "shift": step / (2.0 * STEP * period) * sampled}
 
 
 class SamplingSkew(MeasurementError, FreeCurve, Alternatives, Described):
@@ -77,21 +90,20 @@ class SamplingSkew(MeasurementError, FreeCurve, Alternatives, Described):
         return 0.0012 * nominal.sample_time_s
 
     def relevant(self, nominal):
-        """By which the slope that the EMF gives the currents is the error of a sensor of class 0.3."""
-        m = nominal.machine
-        slope = linear_limit(nominal.inverter.dc_bus_v) / m.inductance_q_h
-        return max(super().relevant(nominal), CLASS * m.rated_current_a / slope)
+        """As of a delay of the voltage, which leaves the same on the d axis."""
+        return RELEVANT_PERIODS * nominal.sample_time_s
 
     def ceiling(self, nominal):
-        return 0.3 * nominal.sample_time_s
+        return ROW * nominal.sample_time_s
 
     def too_large(self, c, view):
-        """The ripple is that of another instant: its columns fit something else; an angle may be a row late."""
-        at = (c.get("pulses", 0.0) + c.get("shift", 0.0)) / view.sample_time_s
+        """The ripple is that of another instant: its columns fit something else; only an angle may be later."""
+        row = view.sample_time_s
+        at = (c.get("pulses", 0.0) + c.get("shift", 0.0)) / row
         if c.get("pulses") and abs(at - view.memo["off_valley"]) > NEAR:
             return True
-        currents = {**c, "angle": 0.0}
-        return abs(c.get("angle", 0.0)) > ROW * view.sample_time_s or super().too_large(currents, view)
+        late = max(ROW * row, LATE / max(view.top_speed, 1e-9))
+        return abs(c.get("angle", 0.0)) > late or self.size({**c, "angle": 0.0}, view.nominal) > OFF_VALLEY * row
 
     def doubt(self, c, view):
         seen = current_error(view, self._pulses(c, view))["u"]
@@ -124,17 +136,19 @@ class SamplingSkew(MeasurementError, FreeCurve, Alternatives, Described):
         return current_error(view, late * zero_vector_slope(view) + off_valley(view, late / view.sample_time_s))
 
     def plant(self, c, nominal):
-        return {"timing.sampling_skew_s": c.get("tau", 0.0) + c.get("pulses", 0.0) + c.get("shift", 0.0)}
+        skew = c.get("tau", 0.0) + c.get("pulses", 0.0) + c.get("shift", 0.0)
+        late = -c.get("angle", 0.0)
+        return {"timing.angle_delay_s": late} if late else {"timing.sampling_skew_s": skew}
 
 
 EFFECT = SamplingSkew(
     name="sampling_skew",
-    title="shifted sampling instant of the currents",
-    equation="i_measured = i(t + tau), di/dt = -(R i + j omega psi_m) / L",
+    title="skew between currents and angle",
+    equation="i_measured = i(t + tau), di/dt = -(R i + j omega psi_m) / L, or theta_measured = theta(t - tau)",
     signature="order 0: omega^2 psi_m tau on the d axis, equivalent to an iron loss of R_fe = -L_q / tau",
     separated_by="load (an iron loss also follows omega^2 i_q); a deliberately shifted sampling trigger",
     parameters=(
-        Parameter("skew_s", "s", "of the currents; positive: late", "after the angle by", "before the angle by"),
+        Parameter("skew_s", "s", "positive: currents sampled after the angle", "angle late by", "angle early by"),
     ),
-    needs=("harmonics", "inverter"),
+    needs=("inverter", "voltage"),
 )

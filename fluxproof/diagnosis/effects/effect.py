@@ -56,12 +56,17 @@ class Effect:
     # values outside have low prior odds and are flagged, with another explanation.
     plausible: dict = field(default_factory=dict, hash=False)
     otherwise: str = ""
+    beside_torque: str = ""  # as ``separated_by``, of a recording that has the torque already
     clause: str = ""  # of a suspect: completes "the residual looks as if ..."
 
     @property
     def named(self) -> bool:
         """Whether it may be reported; a suspect, for which the simulation has no parameter, is only described."""
         return not self.clause
+
+    def experiment(self, torque: bool) -> str:
+        """What separates it from effects with a similar signature; torque: whether the torque was compared."""
+        return self.beside_torque if torque and self.beside_torque else self.separated_by
 
     def core(self, view) -> dict[object, Column]:
         """Columns of the usual formula, {coefficient: column}."""

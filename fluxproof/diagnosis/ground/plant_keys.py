@@ -33,10 +33,12 @@ class Timing:
 
     delay_s: the voltage acts this much later than duty_applied_after_samples says.
     sampling_skew_s: the currents are sampled this long after the PWM centre; negative: before it.
+    angle_delay_s: the measured angle is this old, from a filter, an observer or an older message.
     """
 
     delay_s: float = 0.0
     sampling_skew_s: float = 0.0
+    angle_delay_s: float = 0.0
 
 
 SECTIONS = {"machine": Machine, "inverter": Inverter, "sensors": Sensors, "timing": Timing}

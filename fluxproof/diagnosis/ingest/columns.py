@@ -89,7 +89,8 @@ def plan_columns(names: dict[str, str], nominal, path) -> Plan:
     plan, taken = _explicit(names, nominal, path)
     left = {name: unit for name, unit in names.items() if name not in taken}
     _exact(plan, left, nominal, path)
-    if not _ready_made(plan, left, nominal, path):
+    known = _ready_made(plan, left, nominal, path)
+    if not known or missing_columns(set(plan.sources) | set(plan.assumed)):
         _usual_names(plan, left, nominal, path)
     constants = constants_of(nominal)
     for name in [name for name in constants if name in plan.sources]:

@@ -50,7 +50,7 @@ def as_table(path, columns: dict, meta: dict, problems, lacks=frozenset()) -> Re
     n = len(columns["i_q"])
     meta["notes"].append(
         f"no time column, and the rows do not follow each other: each of the {n} rows is one operating point; a drift "
-        "over time and a delay cannot be diagnosed from them"
+        "over time cannot be diagnosed from them"
     )
     lacks = lacks | {"harmonics", "samples", "time"}
     recording = Recording(str(path), columns | {"t": np.arange(n, dtype=float)}, np.ones(n, bool), np.zeros(n, bool),
@@ -85,5 +85,5 @@ def mark_points(recording, usual: float, period: float) -> None:
     recording.slow = recording.points = True
     recording.lacks |= {"harmonics", "samples"}
     message = f"a row every {usual:g} s, the control samples every {period:g} s: every row is one operating point"
-    action = "each must be steady; delays cannot be diagnosed"
+    action = "each must be steady"
     recording.problems.append(Problem("slow_sampling", message, "t", 0, len(recording), action))

@@ -23,6 +23,7 @@ FACTORS = {
     "s": {
         "s": 1.0,
         "sec": 1.0,
+        "second": 1.0,
         "seconds": 1.0,
         "ms": 1e-3,
         "us": 1e-6,
@@ -36,6 +37,7 @@ FACTORS = {
         "A": 1.0,
         "Amps": 1.0,
         "amps": 1.0,
+        "Amp": 1.0,
         "Ampere": 1.0,
         "Amperes": 1.0,
         "mA": 1e-3,

@@ -27,7 +27,18 @@ def _written(letters: Iterable[str], parts: Iterable[str], endings: Iterable[str
 
 # The usual names of every column; of two columns with names of one signal, the one that stands first counts.
 NAMES: dict[str, tuple[str, ...]] = {
-    "t": ("t", "time", "timestamp", "time_stamp", "zeit"),
+    "t": (
+        "t",
+        "time",
+        "timestamp",
+        "time_stamp",
+        "zeit",
+        "datetime",
+        "date_time",
+        "elapsed",
+        "elapsed_time",
+        "x_value",
+    ),
     "theta_e": ("theta_e", "theta_el", "theta_elec", "phi_el"),
     "omega_e": ("omega_e", "omega_el", "omega_elec"),
     "u_dc": ("u_dc", "udc", "v_dc", "vdc", *_written("uv", ("bus", "bat", "zk", "dclink")), "dc_bus", "bus_voltage"),
@@ -49,6 +60,8 @@ for _axis in "dq":
 
 # Names that count only with one of these units.
 TOLD_BY_UNIT = {
+    "t": (("x", "x_axis", "xaxis"), set(FACTORS["s"])),
+    "omega_e": (("f_el", "f_elec", "fe", "elec_freq", "electrical_frequency"), {"Hz"}),
     "u_line": (("u_ll", "u1_ll", "u_ll_rms", "u_l_l", "urms_ll", "u_line"), {"V rms", "V_rms", "Vrms"}),
     "i_line": (("i", "i1", "i_rms", "irms", "i_line", "i_phase"), {"A rms", "A_rms", "Arms"}),
     "p_el": (("p_el", "p_elec", "p_electric", "p1", "p"), set(FACTORS["W"])),

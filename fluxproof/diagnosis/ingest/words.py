@@ -20,7 +20,7 @@ NEUTRAL = frozenset(
     "component the of side maschine messwert".split()
 )
 PLACE = frozenset("at in drive inverter controller".split())
-SHAFT = frozenset("output shaft rotor mechanical mech welle".split())
+SHAFT = frozenset("output shaft rotor mechanical mech m welle".split())
 ELECTRICAL = frozenset("electrical electric elec el elektrisch".split())
 REFERENCE = frozenset(
     "ref reference setpoint set point command commanded cmd target demand demanded desired soll".split()
@@ -30,7 +30,7 @@ CELL = frozenset("load cell sensor transducer flange".split())
 WINDING = frozenset("winding windings stator coil wicklung wdg motor".split())
 CURRENT = frozenset("current currents i strom".split())
 VOLTAGE = frozenset("voltage volts u v spannung".split())
-SPEED = frozenset("speed velocity vel n rpm erpm krpm drehzahl".split())
+SPEED = frozenset("speed velocity vel n w omega rpm erpm krpm drehzahl".split())
 TORQUE = frozenset("torque t m md drehmoment".split())
 TEMPERATURE = frozenset("temperature temp t temperatur".split())
 DUTY = frozenset(("duty", "tastgrad"))
@@ -38,6 +38,7 @@ AXES = {"d": frozenset(("d", "direct")), "q": frozenset(("q", "quadrature"))}
 PHASES = {"a": ("a", "u", "l1"), "b": ("b", "v", "l2"), "c": ("c", "w", "l3")}
 JOINED: dict[str, str] = {  # words that are two
     "id": "i d", "iq": "i q", "ud": "u d", "uq": "u q", "vd": "v d", "vq": "v q", "daxis": "d", "qaxis": "q",
+    "wm": "w mech", "we": "w el", "omegam": "omega mech", "omegae": "omega el",
     "vdc": "v dc", "udc": "u dc", "vbus": "v bus", "ubus": "u bus", "vbat": "v bat", "ubat": "u bat",
 }  # fmt: skip
 LATER = 100  # rank of a name in words: behind those of usual_names.py

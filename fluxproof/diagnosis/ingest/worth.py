@@ -12,6 +12,7 @@ from fluxproof.diagnosis.ground.recording import COLUMNS
 from fluxproof.diagnosis.ingest.demand import COMMANDED, CURRENTS
 from fluxproof.quote import shown
 
+MOST_CHANNELS = 4
 FLUX = re.compile(r"(psi|lambda|flux)[ _]?[dq]([ _(\[].*)?", re.I)
 TORQUE = re.compile(r"torque|drehmoment|\bN[ .*]?mm?\b", re.I)
 MAP = (
@@ -42,6 +43,11 @@ ANGLE = (
 UNNAMED = (
     ". {} may be terminal voltages of a machine that is turned without current (an EMF run): then the command needs {}"
 )
+CHANNEL = re.compile(r"(ch|channel|c|dev\d+[_/]ai|ai|probe)?[ _]?\d+|channel [a-d]", re.I)
+SCOPE = (
+    ". {} are channels of an instrument: say which signal each has, as an EMF run of a machine that is turned without "
+    "current (--column {}), or currents and duties of the control with the angle"
+)
 PROBES = {1: ("u_ab",), 2: ("u_ab", "u_bc"), 3: ("u_a", "u_b", "u_c")}
 LITTLE = (
     ". Quantities of the supply alone show nothing of the machine; nearest kinds: a table (i_d, i_q, u_q_ref, "
@@ -61,8 +67,12 @@ def worth(missing: list[str], names: dict[str, str], have: set[str], taken=()) -
     if lacks_voltages and any(TORQUE.search(f"{name} {unit}") for name, unit in names.items()):
         return DYNO
     if not CURRENTS & have:
-        if have == {"t"} and len(names) - 1 in PROBES:
-            return _unnamed([name for name in names if name not in taken])
+        left = [name for name in names if name not in taken]
+        if have == {"t"} and len(left) in PROBES:
+            return _unnamed(left)
+        channels = [shown(name) for name in left if CHANNEL.fullmatch(name)]
+        if channels and not have - {"t"}:
+            return SCOPE.format(", ".join(channels[:MOST_CHANNELS]), shown(f"{channels[0]}=u_ab"))
         return "" if COMMANDED & have else LITTLE
     if lacks_voltages:
         return VOLTAGES

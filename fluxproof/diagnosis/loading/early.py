@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What needs no diagnosis to be refused: a file that is missing, a text table without a column that is needed.
+"""What needs no diagnosis to be refused: a file that is missing, or of no known format, a table without a column.
 
 A command asks here first, as the libraries of a diagnosis take seconds to import.  Messages are those of a complete
 run, which this module leaves to judge everything else; it imports NumPy and nothing that is larger.
@@ -14,6 +14,7 @@ from fluxproof.diagnosis.ground.limits import head_of
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.ingest.columns import plan_columns
 from fluxproof.diagnosis.readers import text
+from fluxproof.diagnosis.readers.packed import refuse_packed
 from fluxproof.diagnosis.readers.sniff import sniff
 from fluxproof.diagnosis.readers.table import chosen, repeated
 from fluxproof.quote import escaped
@@ -50,10 +51,13 @@ def _stand_in(tables, drive, named):
 def _refuse_columns(path: Path, nominal) -> None:
     """RecordingError if the header of a text table lacks a column."""
     head = head_of(path)
+    refuse_packed(path, head)
     if path.suffix.lower() not in text.SUFFIXES or not text.matches(head, path):
         return
     try:
         layout = sniff(path)
+    except RecordingError:
+        raise
     except Exception:  # whatever it is, the reader says it in full
         return
     units = {name: unit for name, unit in zip(layout.names, layout.units, strict=True)}

@@ -131,9 +131,10 @@ def _errors(plant: Plant, nominal: Nominal) -> tuple[Errors, float]:
     return errors, beyond["theta_offset"]
 
 
-def _true_angle(theta, plant: Plant, offset):
-    """The true angle for the angle that the sensor reads; both electrical, unwrapped [rad]."""
+def _true_angle(theta, omega, plant: Plant, offset):
+    """The true angle for the one that is read, unwrapped [rad]; omega: of the intervals [rad/s]; all electrical."""
     s, p = plant.sensors, plant.machine.pole_pairs
+    theta = theta + plant.timing.angle_delay_s * np.append(omega, omega[-1])
     theta_m = (theta - offset) / p
     once = s.eccentricity_once_rad * np.sin(theta_m + s.eccentricity_once_phase_rad)
     twice = s.eccentricity_twice_rad * np.sin(2.0 * theta_m + s.eccentricity_twice_phase_rad)
@@ -151,7 +152,7 @@ def _simulate(part: Stretch, plant: Plant, nominal: Nominal, recorded) -> np.nda
     inverter = dataclasses.replace(inverter, zero_current_a=max(inverter.zero_current_a, ripple))
     params = plant_params(machine, inverter, mode=IMPOSED_SPEED)
     first = recorded[part.rows[0]]
-    theta = _true_angle(part.theta, plant, offset)
+    theta = _true_angle(part.theta, part.omega, plant, offset)
     i_d, i_q = part.i_ref[0]
     state = initial_state(
         machine, params, i_d=i_d, i_q=i_q, omega_m=part.omega[0] / machine.pole_pairs,

@@ -19,6 +19,7 @@ from pathlib import Path
 
 from fluxproof.diagnosis.ground.limits import head_of, limited
 from fluxproof.diagnosis.ground.recording import RecordingError
+from fluxproof.diagnosis.readers.packed import refuse_packed
 from fluxproof.diagnosis.readers.table import Select, Table, shown
 from fluxproof.quote import escaped
 
@@ -68,6 +69,7 @@ def _quiet():
 
 def _reader_of(path: Path, head: bytes):
     """The reader for the content; RecordingError if the file name claims another format."""
+    refuse_packed(path, head)
     known = readers()
     found = next((m for m in known if m.matches(head, path)), None)
     suffix = path.suffix.lower()

@@ -27,7 +27,8 @@ NUMBER = {
     ",": re.compile(r"[+-]?(\d+(,\d*)?|,\d+)([eE][+-]?\d+)?", re.ASCII),
 }
 UNIT_LINE = re.compile(
-    r"[\[(]?\s*((s|ms|[uµ]s|A|mA|V|mV|rad|deg|°|rpm|1/min|min-1|rad/s|°C|degC|C|Nm|N[m·.]|%|1|-)\s*)?[\])]?"
+    r"[\[(]?\s*((s|ms|[uµ]s|A|mA|V|mV|rad|deg|°|rpm|1/min|min-1|rad/s|°C|degC|C|Nm|N[m·.]|%|1|-"
+    r"|(?i:seconds?|volts?|amp(ere)?s?))\s*)?[\])]?"
 )
 LONGEST_UNIT = 8
 
@@ -85,9 +86,10 @@ def sniff(path) -> Layout:
     candidates = (_candidate(lines, separator, decimal) for separator in SEPARATORS for decimal in ".,")
     score, separator, decimal, first, width = max(candidates, key=lambda c: c[0])
     if score <= 0:
-        raise RecordingError(f"{path}: no row of numbers in the first {len(lines)} lines; a table was expected")
+        json = "; JSON is not read: write a column for each signal" if head.lstrip()[:1] in (b"{", b"[") else ""
+        raise RecordingError(f"{path}: no row of numbers in the first {len(lines)} lines; a table was expected{json}")
     names, units = _header(lines[:first], separator, width)
-    above = split(lines[first - 1], separator) if first else []
+    above = _without_rest(split(lines[first - 1], separator), width) if first else []
     if names[0] == "1" and len(above) > 2 and all(above) and separator != " ":
         raise RecordingError(f"{path}:{first}: a header of {len(above)} names above rows of {width} fields")
     return Layout(encoding, separator, decimal, first, _with_time(names, split(lines[first], separator)), units)
@@ -131,6 +133,8 @@ def _candidate(lines, separator, decimal):
         if numbers > words:
             scores[len(fields)] += numbers - 2 * words
             first.setdefault(len(fields), k)
+        elif not numbers and words == len(fields) > 1 and first.get(words) == k - 1:
+            del first[words]  # "x-axis,1,2" above a line of units names channels
     width, score = scores.most_common(1)[0] if scores else (0, 0)
     return score, separator, decimal, first.get(width, 0), width
 
@@ -147,6 +151,7 @@ def _header(lines, separator, width):
     rows = []
     for line in reversed(lines):
         fields = split(line.strip().lstrip("#%/").strip() if line.lstrip().startswith(COMMENT) else line, separator)
+        fields = _without_rest(fields, width)
         if len(fields) == width - 1 and separator != " ":
             fields.append("")  # rows that end in a separator
         if len(fields) == width and any(fields):
@@ -159,6 +164,11 @@ def _header(lines, separator, width):
     elif rows:
         names = rows[0]
     return [name or str(k + 1) for k, name in enumerate(names)], units
+
+
+def _without_rest(fields, width) -> list[str]:
+    """The fields of a header without what no row has: an empty last one, or LabVIEW's comment."""
+    return fields[:width] if all(f.lower() in ("", "comment") for f in fields[width:]) else fields
 
 
 def _are_units(fields, above) -> bool:

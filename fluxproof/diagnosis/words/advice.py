@@ -133,7 +133,8 @@ def whole(rpm: float) -> str:
 
 
 def _separated(answer, effects) -> str:
-    how = [effects[n].separated_by for group in answer.ambiguity for n in group if n in effects]
+    torque = answer.evidence.torque
+    how = [effects[n].experiment(torque) for group in answer.ambiguity for n in group if n in effects]
     return f"To separate them: {'; '.join(list(dict.fromkeys(how))[:2])}."
 
 
@@ -145,7 +146,7 @@ def _where(answer, nominal, effects) -> str:
         return f"Check on the drive whether {u.meaning}.{f' Test: {how[0]}.' if how else ''}"
     if answer.best_fit is not None:
         names = [e.name for e in answer.best_fit.effects if e.name in effects]
-        how = list(dict.fromkeys(f"{effects[n].title}: {effects[n].separated_by}" for n in names))
+        how = list(dict.fromkeys(f"{effects[n].title}: {effects[n].experiment(answer.evidence.torque)}" for n in names))
         return f"Check first what fits best. {'; '.join(capital(text) for text in how[:MOST_CHECKED])}."
     if not answer.remainder:
         return "Record more speeds and currents of both signs, so that the misfit can be located."

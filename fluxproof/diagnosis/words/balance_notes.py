@@ -14,7 +14,8 @@ from fluxproof.diagnosis.words.phrases import capital
 def balance_notes(view, held, effects, ambiguity) -> list[str]:
     """The notes on a view; held: (b,) bool, held-out blocks; effects: those that the view shows."""
     if isinstance(view, SlowView):
-        return [*_of_points(view, held), *(_separated(effects[n]) for group in ambiguity for n in group)]
+        torque = bool(np.isfinite(view.torque).any())
+        return [*_of_points(view, held), *(_separated(effects[n], torque) for group in ambiguity for n in group)]
     rows, out = view.u_dc.shape[1], int(held.sum())
     notes = [f"The voltage balance uses {len(view)} steady blocks of {rows} rows; {out} of them were held out."]
     if not np.isfinite(view.torque).any():
@@ -58,5 +59,5 @@ def _of_points(view, held) -> list[str]:
     return notes
 
 
-def _separated(effect) -> str:
-    return f"{capital(effect.title)} is separated from similar effects by: {effect.separated_by}."
+def _separated(effect, torque) -> str:
+    return f"{capital(effect.title)} is separated from similar effects by: {effect.experiment(torque)}."

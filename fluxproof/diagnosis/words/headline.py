@@ -26,7 +26,7 @@ from fluxproof.diagnosis.words.phrases import (
 
 ASSUMED = ("assumed_time",)  # codes of findings
 SENSOR = ("angle_step", "angle_drift", "angle_uneven")  # which a user has to mend, whatever else is found
-REASONS = (*ASSUMED, "gates_off", "repeated", "gap", "dropped", "stuck", "slow_sampling")
+REASONS = (*ASSUMED, "unit", "gates_off", "repeated", "gap", "dropped", "stuck", "slow_sampling")
 MOST_BESIDE = 2
 MOST_LETTERS = 200  # two lines of a terminal or of the report; only what the checks or the replay found may be longer
 
@@ -43,10 +43,16 @@ def _beside(answer) -> str:
     codes = REASONS if answer.verdict == "bad_recording" else ASSUMED
     if answer.verdict != "no_mismatch":  # which names what was corrected
         codes = (*SENSOR, *codes)
-    messages = (p.message.partition(":")[0] if p.code in SENSOR else p.message
-                for p in answer.problems if p.code in codes and not p.fatal)  # fmt: skip
+    messages = (_told(p) for p in answer.problems if p.code in codes and not p.fatal)
     found = dict.fromkeys(messages)
     return "".join(f" {capital(message)}." for message in list(found)[:MOST_BESIDE])
+
+
+def _told(problem) -> str:
+    """What a finding says in a headline: of a unit also which one was taken."""
+    if problem.code == "unit":
+        return f"{problem.message} ({problem.action})"
+    return problem.message.partition(":")[0] if problem.code in SENSOR else problem.message
 
 
 def _guessed(answer) -> str:
@@ -78,7 +84,7 @@ def _variants(answer, effects) -> list[str]:
         return [f"Simulation and recording agree: {floor}."]
     if answer.verdict == "explained":
         return [f"{capital(what)}." for what in _named(answer, effects)]
-    named, sets = _named(answer, effects, brackets=True), _sets(answer.ambiguity, effects)
+    named, sets = _named(answer, effects, brackets=True), _sets(answer, effects)
     if answer.verdict == "ambiguous":
         if not answer.effects:
             return [f"This recording cannot separate {group}." for group in sets]
@@ -130,11 +136,13 @@ def _named(answer, effects, brackets=False) -> list[str]:
     return [*sized, joined([*first, *titles]), joined([*first, *few])]
 
 
-def _sets(groups, effects) -> list[str]:
-    """The ambiguities: all members of each set, the first two of each, and their number."""
-    titles = [[title_of(n, effects) for n in group] for group in groups]
+def _sets(answer, effects) -> list[str]:
+    """The ambiguities: all members with the sizes of each alone, all, the first two of each, and their number."""
+    alone = {e.name: said(e, effects, 1, brackets=True) for e in answer.alternatives}
+    sized = [[alone.get(n, title_of(n, effects)) for n in group] for group in answer.ambiguity]
+    titles = [[title_of(n, effects) for n in group] for group in answer.ambiguity]
     short = [t if len(t) < 4 else [*t[:2], f"{len(t) - 2} other effects"] for t in titles]
-    texts = ["; and ".join(joined(t) for t in each) for each in (titles, short)]
+    texts = ["; and ".join(joined(t) for t in each) for each in (sized, titles, short)]
     others = sum(map(len, titles)) - 1
     return [*texts, f"{titles[0][0]} and {others} other effect{'s' if others > 1 else ''}" if titles else ""]
 
