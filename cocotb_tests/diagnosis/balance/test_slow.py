@@ -68,6 +68,17 @@ def test_speed_is_needed():
         slow_view(recording, NOMINAL)
 
 
+def test_a_log_that_is_too_short_says_how_long_it_lasts():
+    """A module's log of 0.17 s whose sample time was missing was told that it is not steady."""
+    t = 4e-4 * np.arange(425)
+    noise = 0.01 * np.random.default_rng(3).normal(size=(4, 425))
+    columns = {"i_d": noise[0], "i_q": 10.0 + noise[1], "u_d_ref": noise[2], "u_q_ref": 8.0 + noise[3]}
+    short = from_columns({"t": t, **columns, "omega_e": np.full(425, 52.0)}, 1e-4, "module.csv")
+    unstated = replace(NOMINAL, control=replace(NOMINAL.control, sample_time_s=None))
+    with pytest.raises(RecordingError, match=r"lasts 0\.17 s.* takes 0\.5 s: .*every 0\.0004 s.*sample_time_s"):
+        stretches(short, unstated)
+
+
 def test_block_of_the_nominal_drive_has_no_misfit():
     view = slow_view(log(Truth(noise_v=0.0, noise_a=0.0)), NOMINAL)
     left = np.abs(misfit(view)["u"]).mean(axis=1)

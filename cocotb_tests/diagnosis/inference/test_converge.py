@@ -21,6 +21,7 @@ class Fit:
     take: np.ndarray = field(default_factory=lambda: np.array([0]))
     cov: np.ndarray = field(default_factory=lambda: np.array([[1e-4]]))
     stands: bool = False
+    value: float = 0.0
 
 
 def fit_at(x, key="a"):
@@ -68,3 +69,19 @@ def test_an_impossible_linearisation_is_none(monkeypatch):
 def test_a_column_may_vanish_between_two_steps():
     one, other = {"skew": {"tau": 2.0}}, {"skew": {"tau": 4.0, "pulses": 6.0}}
     assert converge._halfway(one, other) == converge._halfway(other, one) == {"skew": {"tau": 3.0, "pulses": 3.0}}
+
+
+def test_a_set_that_falls_below_what_has_weight_is_given_up(monkeypatch):
+    """One that was good on the linearisation of another set only: twelve steps of it were most of a search's time."""
+    at = []
+
+    def problem(setup, c, names):
+        at.append(c["offset"]["a"])
+        fit = fit_at(at[-1] + 1.0)
+        fit.value = -10.0 * len(at)
+        return SimpleNamespace(fit=lambda names: fit)
+
+    monkeypatch.setattr(converge, "_at", problem)
+    first = fit_at(0.0)
+    first.value = 0.0
+    assert not converge.converged(None, first, 14, least=-25.0).stands and len(at) == 4

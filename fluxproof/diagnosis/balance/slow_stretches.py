@@ -193,6 +193,11 @@ def stretches_of(recording, nominal, least_s) -> Stretches:
             k += 1
     if not found:
         why = ", two messages of the slowest signal," if window > least_s else ""
+        if t[-1] < window:  # not a row was judged
+            raise RecordingError(
+                f"{r.source}: it lasts {t[-1]:.2g} s, and with a row every {np.median(step):.3g} s a steady operating "
+                f"point takes {window:.2g} s{why.rstrip(',')}: record longer{_unstated(nominal, t)}"
+            )
         raise RecordingError(
             f"{r.source}: in no stretch of {window:.2g} s{why} are current, speed and voltage steady"
             f"{_unmet(omega, angle, window, turns)}: record longer operating points, or log faster"

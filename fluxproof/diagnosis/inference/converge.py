@@ -50,10 +50,11 @@ def _halfway(one, other):
     }
 
 
-def converged(setup, fit, steps) -> FittedSet | None:
+def converged(setup, fit, steps, least=-np.inf) -> FittedSet | None:
     """A set of effects on its own linearisation, or None; steps: at most so many.
 
-    If steps stop shrinking (for example where a small current changes sign), every further step is halved.
+    If steps stop shrinking (for example where a small current changes sign), every further step is halved.  A set whose
+    log posterior is below ``least`` and still falls is given up: where it stands, it has no weight.
     """
     at, last, damped = fit.c, np.inf, False
     for _ in range(steps):
@@ -64,6 +65,8 @@ def converged(setup, fit, steps) -> FittedSet | None:
         step = moved(new, fit)
         if step < STANDS:
             return replace(new, stands=True)
+        if new.value < fit.value < least:
+            return new
         damped |= SHRINKS * last < step < np.inf
         at = _halfway(at, new.c) if damped else new.c
         fit, last = new, step

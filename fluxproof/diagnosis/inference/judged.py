@@ -65,7 +65,8 @@ class Judged:
 
     def linearise(self, names: Names, steps=3):
         """Judge a set on its own linearisation."""
-        found = converged(self.setup, self.fits[names], steps)
+        stood = max((f.value for f in self.fits.values() if f.stands), default=-np.inf)
+        found = converged(self.setup, self.fits[names], steps, stood - CLOSE)
         if found is None:
             self.fits[names] = replace(self.fits[names], value=-np.inf, own=True)
         else:
