@@ -53,14 +53,17 @@ def is_usual(parameters: dict[str, Estimate], plausible: dict, nominal) -> bool:
 
 
 def beyond(estimate, limits, nominal) -> float:
-    """How far an estimate lies outside of what is plausible: 0.0 where it is believable, 1.0 at the limit, 2.0 at twice it.
+    """How far an estimate lies outside of what is plausible: 0.0 where it is believable, 1.0 at the limit.
 
-    The distance from the middle of the range, in units of half the range.
+    The distance from the middle of the range in units of half the range: of the logarithms where a range is that of a
+    factor, so that a quarter is as far from a half as four is from two.
     """
     if believable(estimate, limits, nominal):
         return 0.0
-    low, high = plausible_range(limits, nominal)
-    return abs(estimate.value - 0.5 * (low + high)) / (0.5 * (high - low))
+    (low, high), value = plausible_range(limits, nominal), estimate.value
+    if low > 0.0:
+        low, high, value = np.log(low), np.log(high), np.log(max(value, 1e-3 * low))
+    return float(abs(value - 0.5 * (low + high)) / (0.5 * (high - low)))
 
 
 def believable(estimate, limits, nominal) -> bool:
