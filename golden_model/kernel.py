@@ -82,7 +82,8 @@ def kernel(function: Callable[P, R_co], cache_dir: Path = CACHE_DIR) -> Kernel[P
     previous = SETTINGS.CACHE_DIR
     SETTINGS.CACHE_DIR = str(cache_dir)
     try:
-        compiled: Any = numba.njit(cache=True)(function)
+        # Nobody takes a kernel's address as that of a C function: compiling the wrapper for it would cost a tenth more.
+        compiled: Any = numba.njit(cache=True, no_cfunc_wrapper=True)(function)
         return compiled
     finally:
         SETTINGS.CACHE_DIR = previous
