@@ -11,6 +11,7 @@ import pytest
 
 from cocotb_tests.support.recordings.from_equations import FAST, T, codes, dq_made, made, nominal_of, write
 from cocotb_tests.support.slow import slowly
+from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.checks import STAGES, checks
 from fluxproof.diagnosis.loading.load import load_recording
 
@@ -314,3 +315,12 @@ def test_a_value_that_is_missing_in_every_second_row_leaves_nothing_to_balance(t
     recording = load_recording(write(tmp_path / "r.csv", table), nominal)
     assert [(p.code, p.column) for p in recording.problems] == [("missing", name), ("too_short", "")]
     assert recording.fatal and not (recording.usable[1:] & recording.usable[:-1]).any()
+
+
+def test_a_missing_value_makes_no_third_sensor(tmp_path, nominal):
+    """The interpolated value breaks the sum of three currents of which one was computed, in a row that is not used."""
+    table = made()
+    table["i_c"] = -table["i_a"] - table["i_b"]
+    table["i_a"] = with_nan(table["i_a"], 2001)
+    recording = load_recording(write(tmp_path / "r.parquet", table), nominal)
+    assert codes(recording) == ["missing"] and view_of(recording, nominal).i_abc is None

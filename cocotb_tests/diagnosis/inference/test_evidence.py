@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The marginal likelihood of a set of effects (inference/evidence.py)."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from fluxproof.diagnosis.decide.off_orders import stray_swing
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.inference.evidence import evidence
 from fluxproof.diagnosis.inference.model import BalanceRows, Columns, Prior
-from fluxproof.diagnosis.inference.points import repeated_dwells
+from fluxproof.diagnosis.inference.points import Grouping, condense, repeated_dwells
 from fluxproof.diagnosis.inference.problem import Problem
 from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.physics import known_effects
@@ -114,3 +116,16 @@ def test_a_swing_is_in_most_blocks():
     volts = 0.05 * np.abs(view.u).max()
     assert stray_swing(view, volts * wave * some[:, None] + noise, 0.0) is None
     assert stray_swing(view, volts * wave + noise, 0.0).kind == "frequency"
+
+
+def test_an_exact_channel_leaves_the_others_their_contrasts():
+    """The sum of currents of which one was computed has a noise of 1e-15: its weight cancelled those behind it."""
+    blocks = np.arange(6)
+    block, channel = np.tile(blocks, 2), np.repeat(["sum", "u"], len(blocks))
+    cells = SimpleNamespace(channel=channel, order=np.zeros(12), part=np.zeros(12, int), block=block)
+    point, use = np.zeros(6, int), np.ones(12, bool)
+    y, sigma = np.where(channel == "u", 3.0**block, 0.0), np.where(channel == "u", 1.0, 1e-15)
+    p = condense(Grouping(cells, point, blocks, use, blocks), y, np.zeros((12, 0)), sigma, np.full(12, 1e-3))
+    means = [np.mean(3.0**blocks)] + [3.0**n - np.mean(3.0 ** blocks[:n]) for n in range(1, 6)]
+    of_u = np.array([name == "u" for name, _, _ in p.groups])[p.group]
+    assert p.y[of_u] == pytest.approx(means) and p.s2[of_u] == pytest.approx([1 / 6, 2, 3 / 2, 4 / 3, 5 / 4, 6 / 5])

@@ -59,7 +59,7 @@ def stator_current(recording: Recording, theta) -> tuple[Complex, np.ndarray | N
 
 def _third_is_computed(i_abc, rated) -> bool:
     """Whether phase currents (n, 3) sum to zero but for the decimals to which the three were rounded in a file."""
-    return bool(np.nanmax(np.abs(i_abc.sum(axis=1))) <= 1.5 * _decimal_step(i_abc) + EXACT * rated)
+    return bool(np.nanmax(np.abs(i_abc.sum(axis=1)), initial=0.0) <= 1.5 * _decimal_step(i_abc) + EXACT * rated)
 
 
 def _decimal_step(values) -> float:
@@ -96,7 +96,7 @@ def view_of(recording: Recording, nominal, catalogue: dict | None = None, block_
     run = np.concatenate([[0], np.cumsum(~linked)])
     theta = _unwrapped(r, run)
     i_raw, i_abc = stator_current(r, theta)
-    if i_abc is not None and _third_is_computed(i_abc, machine.rated_current_a):
+    if i_abc is not None and _third_is_computed(i_abc[r.usable], machine.rated_current_a):
         i_abc = None
     theta_s = smooth(theta, run)
     i_s = smooth(i_raw * np.exp(-1j * theta), run)

@@ -112,6 +112,20 @@ class Grouping:
         self.group = group.ravel()
 
 
+def _earlier(values, begin) -> np.ndarray:
+    """(n, ...) sums of the earlier values since the last row of ``begin``, (m,) first rows.
+
+    Not as a difference of sums over all rows: weights of other channels, 1e30 times as large, would cancel these.
+    """
+    out, end = np.zeros_like(values), np.append(begin[1:], len(values))
+    rows = begin + 1
+    while (more := rows < end).any():
+        rows, end = rows[more], end[more]
+        out[rows] = out[rows - 1] + values[rows - 1]
+        rows = rows + 1
+    return out
+
+
 def condense(grouping, y, x, sigma, level, load=0.0, doubt=None) -> Points:
     """Points of the rows of a grouping.
 
@@ -123,14 +137,12 @@ def condense(grouping, y, x, sigma, level, load=0.0, doubt=None) -> Points:
     n = len(g.names)
     w = 1.0 / sigma[rows] ** 2
     total = np.bincount(g.cell, w, n)
-    earlier = np.cumsum(total) - total
-    earlier -= earlier[begin][place]
+    earlier = _earlier(total, begin)
 
     def condensed(values):
         """(n, k) means and contrasts of (r, k) values, and the visits' own means."""
         mean = np.add.reduceat(w[sort, None] * values[rows][sort], starts, axis=0) / total[:, None]
-        before = np.cumsum(total[:, None] * mean, axis=0) - total[:, None] * mean
-        before -= before[begin][place]
+        before = _earlier(total[:, None] * mean, begin)
         out = np.zeros_like(mean)
         out[contrast] = mean[contrast] - before[contrast] / earlier[contrast, None]
         out[begin] = np.add.reduceat(total[:, None] * mean, begin, axis=0) / np.add.reduceat(total, begin)[:, None]
