@@ -29,6 +29,7 @@ from fluxproof.diagnosis.checks import check_recording
 from fluxproof.diagnosis.conventions.apply import read_drive, read_recording
 from fluxproof.diagnosis.decide.decision import Decision
 from fluxproof.diagnosis.decide.rules import not_compared
+from fluxproof.diagnosis.effects import MeasurementError
 from fluxproof.diagnosis.fleet.prior import among, load_prior
 from fluxproof.diagnosis.ground.nominal import Nominal, load_nominal
 from fluxproof.diagnosis.ground.recording import Problem, Recording, RecordingError
@@ -36,13 +37,23 @@ from fluxproof.diagnosis.ground.result import FILES, Diagnosis, Digital
 from fluxproof.diagnosis.improve.flux_found import NAME as FLUX_MAP
 from fluxproof.diagnosis.improve.flux_found import write_flux_map
 from fluxproof.diagnosis.improve.improve import to_write, write_improved
+from fluxproof.diagnosis.improve.untrimmed import given_trims, without_trims
 from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.overlay.compare import closed_loop
 from fluxproof.diagnosis.physics import Explained, explain, explained, known_effects
 from fluxproof.diagnosis.replay.digital import replay
+from fluxproof.diagnosis.replay.trims import as_ran
 from fluxproof.diagnosis.report import write_outputs
 from fluxproof.diagnosis.words.further_notes import FLUX_MAP as FLUX_MAP_NOTE
-from fluxproof.diagnosis.words.further_notes import loop_notes, not_improved, not_simulated, prior_note
+from fluxproof.diagnosis.words.further_notes import (
+    loop_notes,
+    not_improved,
+    not_simulated,
+    not_trimmed,
+    prior_note,
+    ran_with,
+    trims_unknown,
+)
 from fluxproof.files import refuse_overwriting
 from fluxproof.stage import together
 from golden_model.drive_file import read_tables
@@ -154,6 +165,7 @@ def _worked(loaded, nominal, progress, fleet=None) -> Worked:
     """The digital part, then the physics if the controller's outputs equal those of its golden model."""
     prior = load_prior(fleet, nominal.path) if fleet is not None else None
     digital, notes = _digital(loaded, progress)
+    nominal, differ = as_ran(nominal, loaded)
     if digital.first_difference is not None:
         found = explained(not_compared("digital_mismatch"), loaded)
     else:
@@ -162,7 +174,22 @@ def _worked(loaded, nominal, progress, fleet=None) -> Worked:
     if prior is not None:
         placed = among(prior, found.decision.posterior)
         notes.append(prior_note(placed, found.decision))
+    if any("registers" in recording.meta for recording in loaded):
+        said = [ran_with(differ)] if differ else []
+    else:
+        nominal, said = _untrimmed(nominal, found.decision)
+    found = replace(found, problems=(*found.problems, *said))
     return Worked(found, Beside(digital, placed, tuple(notes), _reading_notes(loaded)), nominal)
+
+
+def _untrimmed(nominal, decision) -> tuple[Nominal, list[Problem]]:
+    """(the drive with the trims that a recording without registers was made with, findings on them)."""
+    nominal, lacking = without_trims(nominal, decision.effects)
+    if lacking:
+        return nominal, [not_trimmed(lacking)]
+    left, known = given_trims(nominal), known_effects()
+    trims = any(isinstance(known.get(effect.name), MeasurementError) for effect in decision.effects)
+    return nominal, [trims_unknown(left)] if left and trims else []
 
 
 def _keep_inputs(out: Path, nominal: Nominal, read: list) -> None:

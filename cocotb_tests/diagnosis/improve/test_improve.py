@@ -16,6 +16,7 @@ from fluxproof.diagnosis.effects import plausible_range
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.result import Estimate, NamedEffect
 from fluxproof.diagnosis.improve.improve import core_values, improved_toml, plant_of, to_write, write_improved
+from fluxproof.diagnosis.improve.untrimmed import without_trims
 from fluxproof.plant import (
     current_code,
     position_code,
@@ -195,3 +196,16 @@ def test_an_implausible_size_is_not_written(name):
             within = 0.0 <= share <= 1.0
             found = NamedEffect(name, 0.99, {key: Estimate(low + share * width, 1e-6 * width, "1")}, 0.9)
             assert bool(to_write(nominal, [found], CATALOGUE)) is within
+
+
+@pytest.mark.parametrize("left, twice", [(0.0347, True), (0.012, False), (-0.0334, False)])
+def test_a_trim_is_not_applied_twice(left, twice):
+    """A recording without registers has the error that a trim of the file cancels: it was made without the trim."""
+    nominal = load_nominal(PAPER)
+    sensors = dataclasses.replace(nominal.sensors, theta_offset_rad=-0.0334, current_gain=(1.0, 0.98, 1.0))
+    nominal = dataclasses.replace(nominal, sensors=sensors, path="")
+    found = [effect({"sensors.position_offset_rad": left / nominal.machine.pole_pairs})]
+    used, lacking = without_trims(nominal, found)
+    assert lacking == ["theta_offset_rad"] * twice and used.sensors.current_gain == sensors.current_gain
+    trims = [v.value for v in core_values(used, found) if v.key == "[sensors] theta_offset_rad"]
+    assert trims == [pytest.approx(-left - (0.0 if twice else 0.0334))]

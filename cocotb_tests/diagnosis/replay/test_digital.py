@@ -18,11 +18,13 @@ from cocotb_tests.support.recordings.dumps import OWNERS, first_row, recording
 from fluxproof.cosim.golden_loop import run_controller
 from fluxproof.cosim.inside import LEFT_OUT
 from fluxproof.cosim.scenarios import everything
+from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import RecordingError, from_columns
 from fluxproof.diagnosis.replay import digital, telemetry
 from fluxproof.diagnosis.replay import flow as digital_flow
 from fluxproof.diagnosis.replay import local as digital_local
 from fluxproof.diagnosis.replay.capture import capture
+from fluxproof.diagnosis.replay.trims import as_ran
 from fluxproof.plant import Inverter
 from golden_model import drive as drives
 from golden_model import fluxproof
@@ -386,3 +388,19 @@ def test_references_come_back(run, tmp_path):
     columns, _ = telemetry.read_dump(dump(tmp_path / "a.dump", run))
     wanted = from_si("i_d_ref", -2.0, DRIVE)
     assert columns["i_d_ref"][1350] == pytest.approx(to_si("i_d_ref", wanted, DRIVE))
+
+
+def test_trims_are_those_that_ran(run, tmp_path):
+    """A drive file that was improved since has others: an error found would be trimmed twice."""
+    nominal = load_nominal(PAPER)
+    made = recording(dump(tmp_path / "a.dump", run))
+    assert as_ran(nominal, [made]) == (nominal, {})
+    trims = {"theta_offset_rad": -0.5, "current_gain": (1.0, 0.98, 1.0), "u_dc_gain": 1.02}
+    mid = 2.0 ** (nominal.sensors.adc_bits - 1)
+    trims |= {"current_offset_code": (mid, mid + 2.0, mid), "u_dc_offset_code": 2.0}
+    later = dataclasses.replace(nominal, sensors=dataclasses.replace(nominal.sensors, **trims))
+    ran, differ = as_ran(later, [made])
+    assert set(differ) == set(trims) and differ["theta_offset_rad"][1] == (-0.5,)
+    assert ran.sensors.theta_offset_rad == pytest.approx(0.0, abs=1e-4) and ran.sensors.u_dc_offset_code == 0.0
+    assert ran.sensors.current_gain == pytest.approx((1.0,) * 3, abs=1e-3)
+    assert ran.sensors.current_offset_code == (mid,) * 3 and ran.sensors.u_dc_gain == pytest.approx(1.0, abs=1e-3)

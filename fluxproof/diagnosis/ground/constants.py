@@ -170,3 +170,5 @@ FAULTY_WIDE, MOST_FAULTY, ONE_FAULTY_IN = 10.0, 0.3, 30.0
 RATE_WORTH, FLEET_EVEN = 2.0, 0.5
 # Sigma over value, or over the least sigma of a set, from which a recording does not determine a parameter.
 USELESS = 10.0
+# Of the error that a trim cancels: an error found that is nearer to it is that error, recorded without the trim.
+SAME_TRIM = 0.25

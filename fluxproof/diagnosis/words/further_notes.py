@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from fluxproof.diagnosis.decide.decision import Decision
+from fluxproof.diagnosis.ground.recording import Problem
 from fluxproof.diagnosis.ground.result import Fleet
 
 FLUX_MAP = (
@@ -31,6 +32,32 @@ def not_improved(name: str, error: Exception) -> str:
 
 def not_simulated(error: Exception) -> str:
     return f"The closed loop was not simulated: {error}."
+
+
+def ran_with(differ: dict) -> Problem:
+    """That a dump was recorded with other trims than the drive file has; differ: {key: (that ran, of the file)}."""
+    numbers = lambda values: ", ".join(f"{v:.6g}" for v in values)  # noqa: E731
+    each = "; ".join(f"{key} = {numbers(ran)}, not {numbers(file)}" for key, (ran, file) in differ.items())
+    message = (
+        f"recorded with other trims than the drive file has: {each}; what is found is the error with those that ran"
+    )
+    return Problem("other_trims", message, action="new trims count from those that ran")
+
+
+def not_trimmed(keys) -> Problem:
+    """That the error found is the one that a trim of the drive file cancels."""
+    names = " and ".join(keys)
+    message = f"the error found is the one that {names} of the drive file cancels: recorded without that trim"
+    return Problem("other_trims", message, action="not applied twice")
+
+
+def trims_unknown(keys) -> Problem:
+    """That a recording does not say whether it was made with the trims of the drive file."""
+    message = (
+        f"the drive file has trims ({', '.join(keys)}), which act only on recordings made with them, and this one does "
+        "not say whether it was"
+    )
+    return Problem("other_trims", message, action="new trims assume that it was")
 
 
 def loop_notes(laid_over: dict) -> list[str]:
