@@ -102,6 +102,10 @@ FAULTS = {
         lambda x: {n: v[np.r_[0:100, 101, 100, 102 : len(v)]] for n, v in x.items()}, "time_order", "t", 101,
         lambda r, x: np.array_equal(r["theta_e"], x["theta_e"]) and not r.joined[99],
     ),
+    "all rows out of order": (
+        lambda x: {n: v[np.random.default_rng(5).permutation(len(v))] for n, v in x.items()}, "time_order", "t", None,
+        lambda r, x: np.array_equal(r["theta_e"], x["theta_e"]) and r.joined[:-1].all(),
+    ),
     "clock restart": (
         lambda x: {n: np.concatenate([v, v]) for n, v in x.items()}, "time_order", "t", 4000,
         lambda r, x: len(r) == 8000 and not r.joined[3999] and (np.diff(r["t"]) > 0).all(),
@@ -269,6 +273,7 @@ FATAL = {
         "unit",
     ),
     "modulation index": (lambda x: edit(x, **{n: 2 * x[n] - 1 for n in ("d_a", "d_b", "d_c")}), "unit"),
+    "amperes as milliamps": (lambda x: edit(x, **{n: x[n] * 1e-3 for n in ("i_a", "i_b", "i_c")}), "unit"),
     "dead bus": (lambda x: edit(x, u_dc=np.zeros(4000)), "unit"),
 }
 
@@ -324,3 +329,19 @@ def test_a_missing_value_makes_no_third_sensor(tmp_path, nominal):
     table["i_a"] = with_nan(table["i_a"], 2001)
     recording = load_recording(write(tmp_path / "r.parquet", table), nominal)
     assert codes(recording) == ["missing"] and view_of(recording, nominal).i_abc is None
+
+
+def test_swapped_currents_show_where_they_are_large(tmp_path, nominal):
+    """At most points of this recording the noise of the voltage hides how much better the exchange is."""
+    table = {name: values[np.r_[400:2000, 3000:3700]] for name, values in made(noise=0.04).items()}
+    swapped = table | {"i_a": table["i_b"], "i_b": table["i_a"]}
+    recording = load_recording(write(tmp_path / "r.parquet", swapped), nominal)
+    assert codes(recording) == ["gap", "swapped_phases"] and same("i_a", "i_b")(recording, table)
+
+
+def test_a_documented_prefix_is_named_beside_the_nameplate(tmp_path, nominal):
+    table = made()
+    header = {f"{name} [mA]" if name in ("i_a", "i_b", "i_c") else name: values for name, values in table.items()}
+    (finding,) = load_recording(write(tmp_path / "r.csv", header), nominal).problems
+    assert finding.code == "unit" and finding.fatal
+    assert "as documented" in finding.message and "rated_current_a" in finding.message and "1000" in finding.message

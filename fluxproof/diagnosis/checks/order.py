@@ -52,6 +52,8 @@ def _mend(recording, step, back, usual) -> None:
     if len(back):
         rows = np.argsort(recording["t"], kind="stable")
         keep_rows(recording, rows)
+        if shuffled:  # of a few rows the time may be wrong and not the place; of all, hardly two were neighbours
+            recording.joined[:-1] = True  # as far as their steps are those of the control (sampling.py)
         recording.problems.append(
             Problem(
                 "time_order",

@@ -13,6 +13,7 @@ OF_CURRENT = {"mA": 1e-3}
 OF_VOLTAGE = {"mV": 1e-3}
 OF_BUS_VOLTAGE = {"mV": 1e-3, "kV": 1e3}
 IN_A_DUTY = {"percent": 100.0, "permille": 1000.0}
+PREFIXES = (1e-6, 1e-3, 1e3, 1e6)  # between the unit that is stated and the right one
 KELVIN = -273.15  # offset to degC
 
 
