@@ -345,3 +345,12 @@ def test_a_documented_prefix_is_named_beside_the_nameplate(tmp_path, nominal):
     (finding,) = load_recording(write(tmp_path / "r.csv", header), nominal).problems
     assert finding.code == "unit" and finding.fatal
     assert "as documented" in finding.message and "rated_current_a" in finding.message and "1000" in finding.message
+
+
+def test_an_angle_in_rad_under_a_header_in_degrees(tmp_path, nominal):
+    table = made()
+    header = {f"{name} [deg]" if name == "theta_e" else name: values for name, values in table.items()}
+    recording = load_recording(write(tmp_path / "r.csv", header), nominal)
+    (finding,) = recording.problems
+    assert (finding.code, finding.column) == ("unit", "theta_e") and "0.01745 rad is stated" in finding.message
+    assert same("theta_e", "omega_e")(recording, table)

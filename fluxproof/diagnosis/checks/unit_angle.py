@@ -50,7 +50,7 @@ def _angle_unit(recording, nominal, p):
     rows = rows_of(recording, nominal)
     if without_speed:
         del recording.columns["omega_e"]
-    units = angle_units(p, _bits(recording["theta_e"]))
+    units = angle_units(p, _bits(recording["theta_e"])) | _as_numbered(recording)
     if isinstance(rows, FastRows) and discriminates(rows):
         as_is = _best_direction(rows, 1.0)
         if as_is <= FIT:
@@ -87,6 +87,12 @@ def _best_direction(rows, factor) -> float:
     theta = rows.theta * factor
     mirrored = rows.i[..., [0, 2, 1]]
     return min(misfit(rows.change(theta=s * theta, i=i)) for s in (1.0, -1.0) for i in (rows.i, mirrored))
+
+
+def _as_numbered(recording) -> dict[str, float]:
+    """{unit: rad} of an angle whose numbers are in rad although the file states another unit."""
+    factor, _ = recording.meta.get("column_scales", {}).get("theta_e", (1.0, 0.0))
+    return {} if factor in (0.0, 1.0) else {f"rad, although a unit of {factor:.4g} rad is stated": 1.0 / factor}
 
 
 def _speed_unit(recording, nominal, p):

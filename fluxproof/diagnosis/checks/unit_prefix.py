@@ -33,8 +33,8 @@ def check(recording, nominal) -> None:
     stated = "as documented" if name in recording.meta.get("documented_units", ()) else "without a stated unit"
     message = (
         f"{', '.join(names)} reach {reaches:.3g} A {stated}, and rated_current_a = {machine.rated_current_a:g} A; "
-        f"voltage and nameplate need {best:g} times these currents (misfit {as_is:.0%} of the voltage, {tried[best]:.0%} with "
-        "them): correct the unit of these columns, or the drive file"
+        f"voltage and nameplate need {best:g} times these currents (misfit {as_is:.0%} of the voltage, "
+        f"{tried[best]:.0%} with them): correct the unit of these columns, or the drive file"
     )
     recording.problems.append(Problem("unit", message, name, 0, len(recording), fatal=True))
 
