@@ -23,7 +23,7 @@ class Beside:
 
     digital: of the replay; prior: the fleet that was the prior; before, read, after: notes of replay and prior, of the
     readers, and of the written files, which stand before and after those on the physics.  improved: whether an improved
-    drive file differs from the given one, as far as one was written.
+    drive file differs from the given one, as far as one was written; worse: whether the closed loop rejected it.
     """
 
     digital: Digital = Digital()
@@ -32,6 +32,7 @@ class Beside:
     read: tuple[str, ...] = ()
     after: tuple[str, ...] = ()
     improved: bool = True
+    worse: bool = False
 
 
 def build(found: Explained, nominal: Nominal, beside: Beside | None = None) -> Diagnosis:
@@ -59,13 +60,13 @@ def build(found: Explained, nominal: Nominal, beside: Beside | None = None) -> D
         evidence=decision.evidence,
         notes=(*beside.before, *notes_of(decision, effects), *beside.read),
     )
-    return worded(facts, read_drive(nominal, decision.readings), beside.after, beside.improved)
+    return worded(facts, read_drive(nominal, decision.readings), beside.after, beside.improved, beside.worse)
 
 
-def worded(facts: Diagnosis, nominal: Nominal, after: tuple[str, ...] = (), improved=True) -> Diagnosis:
+def worded(facts: Diagnosis, nominal: Nominal, after: tuple[str, ...] = (), improved=True, worse=False) -> Diagnosis:
     """A diagnosis with its sentences, made of its other fields; one that is there stays.
 
-    nominal: the drive as it was read; after: notes that stand last; improved: as in Beside.
+    nominal: the drive as it was read; after: notes that stand last; improved, worse: as in Beside.
     """
     effects = known_effects()
     sentence = facts.sentence or headline(facts, effects)
@@ -73,6 +74,6 @@ def worded(facts: Diagnosis, nominal: Nominal, after: tuple[str, ...] = (), impr
         facts,
         sentence=sentence,
         details=details(facts, sentence, effects),
-        advice=advice(facts, nominal, effects, improved),
+        advice=advice(facts, nominal, effects, improved, worse),
         notes=(*facts.notes, *doubts(facts, nominal, effects), *after),
     )

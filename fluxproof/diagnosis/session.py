@@ -39,13 +39,14 @@ from fluxproof.diagnosis.improve.flux_found import write_flux_map
 from fluxproof.diagnosis.improve.improve import to_write, write_improved
 from fluxproof.diagnosis.improve.untrimmed import given_trims, without_trims
 from fluxproof.diagnosis.loading.load import load_recording
-from fluxproof.diagnosis.overlay.compare import closed_loop
+from fluxproof.diagnosis.overlay.compare import closed_loop, is_worse
 from fluxproof.diagnosis.physics import Explained, explain, explained, known_effects
 from fluxproof.diagnosis.replay.digital import replay
 from fluxproof.diagnosis.replay.trims import as_ran
 from fluxproof.diagnosis.report import write_outputs
 from fluxproof.diagnosis.words.further_notes import FLUX_MAP as FLUX_MAP_NOTE
 from fluxproof.diagnosis.words.further_notes import (
+    WORSE,
     loop_notes,
     not_improved,
     not_simulated,
@@ -75,9 +76,9 @@ class Worked:
         """What was decided, and what it was decided from."""
         return self.explained.decision
 
-    def answer(self, *after: str, improved=True) -> Diagnosis:
-        """The diagnosis; after: notes on the written files; improved: whether an improved drive file is among them."""
-        return build(self.explained, self.nominal, replace(self.beside, after=after, improved=improved))
+    def answer(self, *after: str, improved=True, worse=False) -> Diagnosis:
+        """The diagnosis; after: notes on the written files; improved, worse: as in Beside."""
+        return build(self.explained, self.nominal, replace(self.beside, after=after, improved=improved, worse=worse))
 
 
 def diagnose(recordings, drive, progress=lambda text: None, prior=None) -> Diagnosis:
@@ -113,15 +114,20 @@ def _write(worked: Worked, recording, stage, out, progress) -> Diagnosis:
     """All files of the answer into ``stage``, from where they enter ``out``."""
     nominal, decision, notes, laid_over = worked.nominal, worked.decision, [], None
     improved = _improved(nominal, decision, stage, recording, notes.append)
+    worse = False
     if write_flux_map(decision, stage):
         notes.append(FLUX_MAP_NOTE)
     if decision.basis is not None:
         progress("the closed loop over the recording")
         read = read_recording(recording, decision.readings), read_drive(nominal, decision.readings)
         laid_over, said = _overlay(*read, improved and (improved, out / IMPROVED))
+        worse = improved is not None and is_worse(laid_over, decision.fit)
+        if improved is not None and worse:
+            improved.unlink()
+            improved, said = None, [*said, not_improved(IMPROVED, WORSE)]
         notes += said
     progress("writing the report")
-    answer = worked.answer(*notes, improved=improved is not None)
+    answer = worked.answer(*notes, improved=improved is not None, worse=worse)
     write_outputs(answer, stage, nominal, laid_over)
     return answer
 

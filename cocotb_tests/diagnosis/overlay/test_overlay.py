@@ -13,9 +13,9 @@ from fluxproof.cosim.driven_plant import described_sensors
 from fluxproof.cosim.scenarios import RPM, scenario, steps
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import RecordingError, from_columns
-from fluxproof.diagnosis.ground.result import NamedEffect
+from fluxproof.diagnosis.ground.result import Fit, NamedEffect
 from fluxproof.diagnosis.improve.improve import plant_of, write_improved
-from fluxproof.diagnosis.overlay.compare import closed_loop
+from fluxproof.diagnosis.overlay.compare import closed_loop, is_worse
 from fluxproof.diagnosis.overlay.inputs import dq_currents
 from fluxproof.diagnosis.replay.capture import capture
 from fluxproof.diagnosis.replay.telemetry import read_dump, write_dump
@@ -149,3 +149,12 @@ def test_overlay_with_missing_columns(healthy):
     assert np.isfinite(holed["simulated_before"]["u_q_ref"]).all() and holed["rms_before"]["u_q_ref"] < 6.0
     with pytest.raises(RecordingError, match="consecutive rows"):
         closed_loop(from_columns(columns, 2e-4), nominal)
+
+
+@pytest.mark.parametrize("after, worse", [(0.5, False), (2.1, False), (3.0, True)])
+def test_a_worse_drive_is_not_advised(after, worse):
+    """Beside the noise of the balance: a measurement error leaves the loop as it was."""
+    rms = lambda volts: {"u_d_ref": 0.0, "u_q_ref": volts}  # noqa: E731
+    fit = Fit(noise_floor=0.1)
+    assert is_worse({"rms_before": rms(2.0), "rms_after": rms(after)}, fit) is worse
+    assert not is_worse({"rms_before": rms(2.0)}, fit) and not is_worse(None, fit)

@@ -121,6 +121,7 @@ def test_a_file_that_changes_nothing_is_not_recommended(name):
     """What no drive can have is not written, and what is not written is not recommended."""
     usual = replace(made_up()["explained"], effects=(replace(named(name), plant={"machine.x": 1.0}),))
     assert "drive_improved.toml" not in advice(usual, NOMINAL, KNOWN, improved=False)
+    assert advice(usual, NOMINAL, KNOWN, improved=False, worse=True).startswith("Do not take these values")
     absurd = {p.name: Estimate(1e9, 1.0, p.unit) for p in CATALOGUE[name].parameters}
     if CATALOGUE[name].plausible:
         found = (replace(named(name), parameters=absurd, plant={"machine.x": 1.0}),)

@@ -23,6 +23,8 @@ from golden_model.scaling import current_gains
 
 MOST_POINTS = 4_000
 SIGNALS = ("u_d_ref", "u_q_ref", "i_d", "i_q")
+VOLTAGES = SIGNALS[:2]
+MUCH_WORSE = 1.1  # times the difference with the nominal drive
 RUN_IN = 200  # rows at the start of a stretch that are simulated but not shown
 USUAL_BANDWIDTH = 0.05  # of the sampling frequency, if the drive file gives no bandwidth
 
@@ -55,6 +57,17 @@ def closed_loop(recording: Recording, nominal: Nominal, improved=None) -> dict:
             for signal, values in result[f"simulated_{name}"].items()
         }
     return result | {"rows": int(sum(len(p.rows) for p in parts)), "block_rows": block}
+
+
+def is_worse(laid_over: dict | None, fit) -> bool:
+    """Whether the improved drive leaves clearly more of the voltage than the nominal one; fit: of the balance, or None.
+
+    What is within the noise of the balance is no difference.
+    """
+    if laid_over is None or "rms_after" not in laid_over or fit is None:
+        return False
+    before, after = (np.hypot(*(laid_over[f"rms_{when}"][x] for x in VOLTAGES)) for when in ("before", "after"))
+    return bool(after > MUCH_WORSE * before + fit.noise_floor)
 
 
 def _shown(parts: list[Stretch], slow: bool):

@@ -25,11 +25,17 @@ HOW = {  # by the code of a finding
 }
 
 
-def advice(answer, nominal, effects, improved=True) -> str:
+def advice(answer, nominal, effects, improved=True, worse=False) -> str:
     """What to do after this answer.
 
-    effects: the catalogue with the causes beyond it; improved: whether an improved drive file may differ.
+    effects: the catalogue with the causes beyond it; improved: whether an improved drive file may differ; worse:
+    whether the closed loop rejected it.
     """
+    if worse:
+        return (
+            "Do not take these values into the drive file: in the closed loop they are further from the recording than "
+            "the nominal drive. Check first what the columns and their units mean."
+        )
     if answer.verdict == "bad_recording":
         return "Correct the findings of the checks, in the recording or in [columns] of the drive file; diagnose again."
     if answer.verdict == "digital_mismatch":

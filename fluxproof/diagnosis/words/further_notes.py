@@ -13,6 +13,8 @@ FLUX_MAP = (
 )
 OVERLAY_SIGNALS = ("u_d_ref", "u_q_ref")  # not the currents: the controller regulates them to their references
 
+WORSE = "in the closed loop its voltage is further from the recorded one than that of the nominal drive"
+
 
 def prior_note(fleet: Fleet, decision: Decision) -> str:
     """That a fleet was the prior, and what it did."""
@@ -25,7 +27,7 @@ def prior_note(fleet: Fleet, decision: Decision) -> str:
     return f"The population of {fleet.drives} drives in {fleet.path} was the prior: {did}."
 
 
-def not_improved(name: str, error: Exception) -> str:
+def not_improved(name: str, error: Exception | str) -> str:
     """Why the improved drive file was not written."""
     return f"No {name}: {error}."
 
