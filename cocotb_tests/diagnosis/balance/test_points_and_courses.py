@@ -14,6 +14,7 @@ from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.balance.misfit import bulge
 from fluxproof.diagnosis.balance.operating_points import point_numbers
+from fluxproof.diagnosis.balance.point_rows import WHOLE_TURN, block_points, whole_turns
 from fluxproof.diagnosis.ground.nominal import load_nominal
 
 NOMINAL = load_nominal(PAPER)
@@ -61,3 +62,17 @@ def test_operating_point_is_not_split():
         assert point_numbers(points_view(*scattered), 0.08).tolist() == [0] * 6
     apart = points_view((1.0, 0.2), (1.0, 0.6), (1.0, 0.21), (-1.0, 0.2))
     assert point_numbers(apart, 0.08).tolist() == [0, 1, 0, 2]
+
+
+def test_points_of_fast_rows_cover_a_turn(view):
+    """The loss of the inverter changes with the angle; a point is balanced with its mean over a turn."""
+    points = block_points(recorded(), NOMINAL)
+    turned = (points.end - points.first) * np.abs(points.omega) * NOMINAL.sample_time_s
+    assert np.ptp(view.theta, axis=1).min() < 2.0 and 0 < len(points) < len(view)
+    assert not np.isfinite(points.rest).any() and (turned > 0.9 * WHOLE_TURN).all()
+
+
+def test_blocks_of_one_dwell_are_a_turn_together():
+    groups = whole_turns(np.array([0, 0, 0, 0, 0, 1, 1, 1, 2]), np.array([2.2] * 8 + [7.0]))
+    assert [g.tolist() for g in groups] == [[0, 1, 2], [5, 6, 7], [8]]
+    assert [g.tolist() for g in whole_turns(np.array([0, 1]), np.array([2.2, 2.2]))] == [[0], [1]]

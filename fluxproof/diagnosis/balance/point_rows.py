@@ -28,6 +28,7 @@ from fluxproof.diagnosis.ground.recording import RecordingError
 MEANS = 64  # number of means of a long operating point, fine enough for its drift
 SAME_SPEED = 0.02  # relative
 NO_LOSS = 0.005  # of rated current: a smaller one has no loss that could be noticed
+WHOLE_TURN = 0.95 * 2.0 * np.pi  # rad: what is left of the loss's order six beside its mean is then small
 STANDSTILL = 1e-3  # of the speed at which the EMF takes the bus voltage
 
 
@@ -65,14 +66,36 @@ def point_rows(recording, nominal) -> Stretches:
 def block_points(recording, nominal, catalogue: dict | None = None) -> Stretches:
     """The steady blocks of a recording with a row per control period, as operating points.
 
+    Neighbours are averaged until they cover an electrical turn, over which the loss of the inverter is a mean there.
     Raises RecordingError if there is no steady block.
     """
     view = view_of(recording, nominal, catalogue)
     u, i, omega = view.to_dq(view.u[:, 1:-1]).mean(axis=1), view.i.mean(axis=1), view.omega.mean(axis=1)
     span = np.abs(view.theta[:, -1] - view.theta[:, 0])
     rest = np.where(span < AT_REST, view.theta[:, 0], np.nan)
-    first, end, unsteady = view.rows, view.rows + view.u_dc.shape[1], np.zeros(len(view))
-    return Stretches(i, u, omega, view.u_dc.mean(axis=1), view.temp, view.t, first, end, unsteady, rest, 0.0)
+    turns = whole_turns(view.run, np.where(np.isfinite(rest), WHOLE_TURN, span))
+    i, u, omega, u_dc, temp, t = (
+        np.array([np.mean(x[g]) for g in turns]) for x in (i, u, omega, view.u_dc.mean(axis=1), view.temp, view.t)
+    )
+    first, end = np.array([view.rows[g[0]] for g in turns]), np.array([view.rows[g[-1]] for g in turns])
+    unsteady, rest = np.zeros(len(turns)), np.array([rest[g[0]] for g in turns])
+    return Stretches(i, u, omega, u_dc, temp, t, first, end + view.u_dc.shape[1], unsteady, rest, 0.0)
+
+
+def whole_turns(run, span) -> list[np.ndarray]:
+    """Groups of neighbouring blocks of a dwell that cover a turn together; every block alone if none do.
+
+    run: (b,) number of the dwell; span: (b,) angle that each block covers [rad].
+    """
+    groups, start, covered = [], 0, 0.0
+    for n in range(len(run)):
+        if run[n] != run[start]:
+            start, covered = n, 0.0
+        covered += span[n]
+        if covered >= WHOLE_TURN:
+            groups.append(np.arange(start, n + 1))
+            start, covered = min(n + 1, len(run) - 1), 0.0
+    return groups or [np.array([n]) for n in range(len(run))]
 
 
 def _verified(omega, nominal_u, u, good) -> np.ndarray:
