@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 from fluxproof.diagnosis.ground.nominal import Nominal
 from golden_model.fluxproof import REGISTERS
@@ -27,7 +28,8 @@ def as_ran(nominal: Nominal, recordings) -> tuple[Nominal, dict[str, tuple[Trim,
     meta = next((r.meta for r in recordings if {"registers", "config", "telemetry"} <= set(r.meta)), None)
     if meta is None:
         return nominal, {}
-    ran, differ = {}, {}
+    ran: dict[str, Any] = {}
+    differ: dict[str, tuple[Trim, Trim]] = {}
     for key, value, steps in _of_registers(meta, nominal):
         stated = _stated(nominal, key)
         if any(_apart(key, a, b) > step for a, b, step in zip(value, stated, steps, strict=True)):
@@ -40,7 +42,7 @@ def _stated(nominal: Nominal, key: str) -> Trim:
     """The value of the drive file, always a tuple."""
     value = getattr(nominal.sensors, key)
     if value is None:  # the code of zero current
-        value = (2.0 ** (nominal.sensors.adc_bits - 1),) * len(PHASES)
+        value = (2.0 ** ((nominal.sensors.adc_bits or 1) - 1),) * len(PHASES)
     return value if isinstance(value, tuple) else (value,)
 
 
@@ -53,7 +55,7 @@ def _of_registers(meta, nominal: Nominal):
     regs, s, bases = meta["registers"], nominal.sensors, meta["telemetry"]["bases"]
     step = TURN.lsb * TURN_RAD
     yield "theta_offset_rad", (math.remainder(regs["theta_offset"] * step, TURN_RAD),), (step,)
-    if s.adc_bits != meta["config"]["adc_bits"]:
+    if s.adc_bits is None or s.adc_bits != meta["config"]["adc_bits"]:
         return
     code = 2.0 ** (s.adc_bits - 16)  # codes are left-aligned in 16 bits
 
