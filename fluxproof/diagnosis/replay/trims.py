@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Iterator
 from typing import Any
 
 from fluxproof.diagnosis.ground.nominal import Nominal
@@ -50,7 +51,7 @@ def _apart(key, a, b) -> float:
     return abs(math.remainder(a - b, TURN_RAD)) if key == "theta_offset_rad" else abs(a - b)
 
 
-def _of_registers(meta, nominal: Nominal):
+def _of_registers(meta, nominal: Nominal) -> Iterator[tuple[str, Trim, Trim]]:
     """(key of [sensors], values that ran, resolution of their registers) of what [sensors] describes."""
     regs, s, bases = meta["registers"], nominal.sensors, meta["telemetry"]["bases"]
     step = TURN.lsb * TURN_RAD
