@@ -34,7 +34,8 @@ def as_ran(nominal: Nominal, recordings) -> tuple[Nominal, dict[str, tuple[Trim,
     for key, value, steps in _of_registers(meta, nominal):
         stated = _stated(nominal, key)
         if any(_apart(key, a, b) > step for a, b, step in zip(value, stated, steps, strict=True)):
-            ran[key] = value if len(value) > 1 else value[0]
+            first, *more = value
+            ran[key] = value if more else first
             differ[key] = value, stated
     return dataclasses.replace(nominal, sensors=dataclasses.replace(nominal.sensors, **ran)), differ
 
