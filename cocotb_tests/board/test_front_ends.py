@@ -10,6 +10,7 @@ import operator
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 from cocotb_tests.support.board.fault_cases import MOVED, RATE
 from fluxproof.checkout import ROOT
