@@ -140,7 +140,7 @@ def _fit(pieces: list[Moving]) -> tuple[np.ndarray, np.ndarray, float]:
     between the edges of Hall sensors: from the second fit on, speed and angle are those of the fit before.
     """
     theta, told = np.concatenate([p.theta for p in pieces]), np.concatenate([p.told for p in pieces])
-    theta, speeds, currents = theta[told], [p.omega for p in pieces], [p.current.imag for p in pieces]
+    theta, speeds, currents = theta[told], [p.omega for p in pieces], [np.imag(p.current) for p in pieces]
     for _ in range(FITS):
         blocks = []
         for n, (p, omega, i_q) in enumerate(zip(pieces, speeds, currents, strict=True)):
@@ -156,7 +156,7 @@ def _fit(pieces: list[Moving]) -> tuple[np.ndarray, np.ndarray, float]:
         rest = theta - matrix / scale @ found
         found, sigma = found / scale, sigma / scale
         angles = np.split(whole @ found, np.cumsum([len(p.t) for p in pieces])[:-1])
-        currents = [(p.current * np.exp(1j * (p.theta - at))).imag for p, at in zip(pieces, angles, strict=True)]
+        currents = [np.imag(p.current * np.exp(1j * (p.theta - at))) for p, at in zip(pieces, angles, strict=True)]
         speeds = [part @ np.r_[found[2 * n + 1], found[-3:]] for n, part in enumerate(speeds)]
     like = float(np.clip(np.corrcoef(rest[1:], rest[:-1])[0, 1], 0.0, 0.99))
     return found[-3:], sigma[-3:] * math.sqrt((1.0 + like) / (1.0 - like)), rms  # neighbours resemble each other
