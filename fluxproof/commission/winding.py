@@ -208,7 +208,7 @@ def judge(s: Session, points: list[Point]) -> Step:
         rest = values - matrix @ found
         for kind in (0, 1):
             weights[kind::2] = 1.0 / max(math.sqrt(float(np.mean(rest[kind::2] ** 2))), 1e-9)
-    sigma = sigma * math.sqrt(REPEATED)
+    sigma = np.multiply(sigma, math.sqrt(REPEATED))
     misfit = math.sqrt(float(np.mean(rest**2)) * 2.0 / float(np.mean(np.square(sizes))))
     (r, l_d, l_q, v_dead, k, lead), (s_r, s_l_d, s_l_q, s_v, s_k, _) = found, sigma
     l_d, l_q = (held(r * s.t_s, x) for x in (l_d, l_q))
