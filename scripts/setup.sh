@@ -69,6 +69,7 @@ fi
 
 mapfile -t groups < <(missing_groups)
 mapfile -t missing < <(missing_packages | sed '/^$/d')
+say "getting ready what is missing, minutes the first time: ${missing[*]} ${groups[*]}$(needs ghdl5 && ! have_ghdl5 && echo ' GHDL 5')$(printf ' %s' $(uncompiled))"
 
 # Everything below that can be done beside something else is: processes of the background, waited for at the end.
 background=()

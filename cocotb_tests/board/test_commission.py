@@ -14,13 +14,14 @@ from cocotb_tests.support.slow import halved
 from fluxproof import command
 from fluxproof import commission_drive as commissioning
 from fluxproof.checkout import DRIVES
-from fluxproof.commission import alignment, current_scale, wiring
+from fluxproof.commission import alignment, current_scale, motion, winding, wiring
 from fluxproof.commission import session as session_parts
 from fluxproof.commission.bus import CODES, VALUES, WINDOW, BusError, UioBus
 from fluxproof.commission.session import Refusal, Session
 from fluxproof.commission.simulated import SimulatedBus, board_of
 from fluxproof.commission.steps import commission
-from fluxproof.plant import layout
+from fluxproof.plant import Inverter, layout
+from fluxproof.plant.inverter import averaged_leg_voltage, inverter_params
 from golden_model.drive import load
 from golden_model.drive_file import read_tables
 from golden_model.drive_keys import DriveError
@@ -54,6 +55,49 @@ def test_each_fault_is_refused_for_its_reason(name):
     assert right, said
     assert "expected" in said or "contradicts this" in said
     assert current <= 1.0
+
+
+def test_unequal_thresholds_scale_the_voltage():
+    drive = load(DRIVES / "servo_24v.toml")
+    inverter = replace(drive.inverter, v_switch_v=0.3, v_diode_v=1.1)
+    leg = inverter_params(Inverter(300e-9, 0.3, 1.1))
+    for current in (2.0, -2.0):
+        low, high = (averaged_leg_voltage(leg, duty, 24.0, current, 50e-6) for duty in (0.3, 0.7))
+        gain = session_parts.voltage_gain(replace(drive, inverter=inverter), np.array(24.0))
+        assert (high - low) / (0.4 * 24.0) == pytest.approx(float(gain), rel=1e-9) != 1.0
+
+
+def test_an_inductance_of_a_held_voltage():
+    """The exact answer of R and L to a voltage that stands still for a period and turns by w*T between two."""
+    ohm, henry, t_s, w = 0.4, 0.2e-3, 100e-6, 1000.0
+    a, half = np.exp(-ohm * t_s / henry), np.exp(0.5j * w * t_s)
+    answer = ohm * (half - a / half) / (1.0 - a)
+    found = answer.imag / (2.0 / t_s * np.sin(w * t_s / 2.0))
+    assert answer.real == pytest.approx(ohm * np.cos(w * t_s / 2.0))
+    assert found > 1.003 * henry and winding.held(ohm * t_s, found) == pytest.approx(henry)
+
+
+@pytest.mark.parametrize("hall", [False, True])
+def test_torque_steps_with_a_late_speed_and_a_wrong_angle(hall):
+    """Friction turns its sign with the shaft, not with the core's filtered speed; a wrong angle costs torque."""
+    k, b, c, lag = 6000.0, 900.0, 0.5, 2e-3
+    random, pieces, t, speed = np.random.default_rng(5), [], np.arange(0.0, 0.1, 2e-4), -500.0
+    for sign in (1.0, -1.0) * 3:
+        theta, omega, at, cores, core = [], [], 0.0, [], speed
+        error = 0.4 * np.sin(3.0 * np.arange(len(t))) * hall + 2e-3 * random.standard_normal(len(t))
+        i_q = 2.7 * sign
+        for wrong in error:
+            theta, omega, cores = [*theta, at], [*omega, speed], [*cores, core]
+            for _ in range(20):
+                at += 1e-5 * speed
+                speed += 1e-5 * (k * i_q * np.cos(wrong) - b * np.sign(speed) - c * speed)
+                core += 1e-5 * (speed - core) / lag
+        current = np.full(len(t), 1j * i_q)
+        told = np.abs(omega) > (200.0 if hall else -1.0)
+        pieces.append(motion.Moving(t, np.array(theta) + error, current, np.array(cores), told))
+    found, sigma, _ = motion.torque_fit(pieces)
+    assert (np.abs(found - (k, b, c)) < 4.0 * sigma + (1e-3 * k, 0.01 * b, 0.02)).all(), (found, sigma)
+    assert sigma[0] < 0.002 * k and sigma[1] < 0.25 * b
 
 
 @pytest.mark.slow

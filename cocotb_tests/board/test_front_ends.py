@@ -10,10 +10,11 @@ import operator
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 from cocotb_tests.support.board.fault_cases import MOVED, RATE
 from fluxproof.checkout import ROOT
-from fluxproof.cosim import board_clock
+from fluxproof.cosim import board_clock, ghdl
 from golden_model.io.board_faults import NAMES
 from golden_model.io.fault_latch import TRIP
 
@@ -68,6 +69,13 @@ def test_hall_codes_stop_the_drive_by_name():
         assert seen["board_first"] == code and seen["gates_after"] == 0, (name, seen)
         assert seen["ran"] == (name != "111 at enable"), (name, seen)
     assert facts["good"]["board_first"] == 0 and facts["good"]["ran"] and facts["good"]["gates_after"] > 0
+
+
+def test_the_waveform_of_a_relative_folder_lies_there(monkeypatch, tmp_path):
+    """The simulator works in a folder of its own."""
+    monkeypatch.setenv("FLUXPROOF_WAVES", "1")
+    monkeypatch.chdir(tmp_path)
+    assert ghdl.waves(Path("build/waves")) == [f"--fst={tmp_path / 'build/waves/waves.fst'}"]
 
 
 def test_the_golden_board_can_be_compiled():

@@ -146,7 +146,9 @@ def test_what_is_not_said_is_asked_and_never_guessed(capsys):
         (["poles=7", "kv=300 rpm/V"], "'poles=7': expected a whole number that is even"),
         (["poles=8", "r=2 ohm line"], "nothing states the magnet flux"),
         (["poles=8", "kt=2,98 Nm/A"], "a point in place of the comma"),
-        (["poles=8", "kt=3"], "the unit '' is not known here; expected one of Nm/A"),
+        (["poles=8", "kt=3"], "the unit is missing; expected one of Nm/A"),
+        (["poles=8", "kv=100"], "the unit is missing; expected one of rpm/V"),
+        (["poles=8", "kt=3 foo"], "the unit 'foo' is not known here; expected one of Nm/A"),
         (["poles=8", "kt=3 Nm/A foo"], "expected words of dc, peak, rms"),
         (["poles=8", "kt=-3 Nm/A"], "expected a number above zero"),
         (["poles=8", "torque=3"], "with a name of pole_pairs, poles, kt"),
@@ -169,3 +171,29 @@ def test_the_file_is_a_section_of_a_drive_file(tmp_path, capsys):
     before = out.read_text()
     assert main(["constants", "pole_pairs=4", "kt=1 Nm/A", "--out", str(out)]) == 1
     assert out.read_text() == before  # an ambiguity writes nothing
+
+
+def test_an_ampere_of_block_commutation_and_imperial_units():
+    """A DC gives the torque and the loss of 2/sqrt(3) times as large a peak."""
+    texts = ["poles=8", "r=0.5 ohm phase", "i=3.21 A dc"]
+    (machine,) = solved("kt=10 oz-in/A dc", *texts, "j=0.001 oz-in-s2").machines
+    assert machine.i == pytest.approx(3.7066, rel=1e-4) and machine.j == pytest.approx(7.0616e-6, rel=1e-4)
+    torque = 1.5 * machine.pole_pairs * machine.psi * machine.i
+    assert torque == pytest.approx(10 * 0.0070615518 * 3.21, rel=1e-6)
+    assert 1.5 * machine.r * machine.i**2 == pytest.approx(2.0 * machine.r * 3.21**2)
+    (other,) = solved("kt=0.625 lb-in/A dc", *texts, "j=6.25e-5 lb-in-s2").machines
+    assert (other.psi, other.j) == pytest.approx((machine.psi, machine.j), rel=1e-6)
+    assert len(solved("kt=10 oz-in/A dc", "poles=8", "i=3.21 A").machines) == 3  # rms, peak, DC
+
+
+def test_a_resistance_that_nothing_checks_is_said(capsys):
+    unchecked, doubt = "no number here checks the resistance", "more heat than shaft power"
+    for more, said in (
+        ([], (True, False)),
+        (["i=20 Arms", "n=3000 rpm"], (True, True)),
+        (["tau_e=1 ms", "l=50 mH phase"], (False, False)),
+    ):
+        assert main(["constants", "pole_pairs=7", "kv=190 rpm/V", "r=50 ohm phase", *more]) == 0
+        told = capsys.readouterr().out
+        assert (unchecked in told, doubt in told) == said, told
+        assert "for example n=2350 rpm" in told or "n=3000 rpm" in more

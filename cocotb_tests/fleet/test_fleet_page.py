@@ -48,4 +48,10 @@ def test_nothing_to_tell(tmp_path):
     page = render(findings(rows))
     assert "10 recordings of 10 drives: no drive differs." in page and "None, at a share of false ones" in page
     failed = {**row(0, []), "status": "failed", "reason": "not a file", "verdict": "bad_recording"}
-    assert "1 recording of" in headline(findings([failed]))
+    said = "1 recording could not be used."
+    assert headline(findings([failed])) == f"1 recording of 1 drive: {said}"
+    other = {**failed, "serial": "another"}
+    assert headline(findings([*rows, other])) == f"11 recordings of 11 drives: {said}"
+    assert (
+        headline(findings([*rows, failed])) == f"11 recordings of 10 drives: {said}"
+    )  # the drive has another, sound one

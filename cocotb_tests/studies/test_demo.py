@@ -6,6 +6,7 @@ from __future__ import annotations
 import base64
 import io
 import re
+import time
 from collections import namedtuple
 from types import SimpleNamespace
 
@@ -182,6 +183,28 @@ def test_progress_lines():
         line = plain.line({loop: 1500, replay: 300, waiting: 0}, 61.0, columns)
         assert len(line) <= columns and "1500/3000" in line
         assert columns < 79 or line.endswith("s left")
+
+
+def test_the_preparation_says_what_it_does():
+    """A line at the begin of each step before the first period, before the step has ended, and once."""
+    out = io.StringIO()
+    job = demo.InVerilator(
+        "Fig. 9 in Verilator", demo.Named("fluxproof.cosim.runs:closed_loop", (str(PAPER), 100, "short"))
+    )
+    steps = [demo.kernels("golden"), demo.kernels("plant"), job.build, demo.InGhdl.analyse]
+    assert {demo.step_name(step) for step in steps} == set(demo.PREPARED)
+
+    def wait() -> None:
+        for _ in range(100):
+            if out.getvalue():
+                break
+            time.sleep(0.01)
+        else:
+            out.write("nothing was said in a second")
+
+    wait.__name__ = "kernels of the golden"
+    demo.watch([demo.Lane(wait)], [], out, pause=0.01)
+    assert out.getvalue() == "compiling the golden model; up to some minutes the first time\n"
 
 
 @pytest.fixture

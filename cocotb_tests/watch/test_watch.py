@@ -27,6 +27,7 @@ from fluxproof.commission.simulated import SimulatedBus, board_of
 from fluxproof.cosim.scenarios import everything
 from fluxproof.diagnosis.example import motor
 from fluxproof.diagnosis.replay.capture import capture, packets
+from fluxproof.diagnosis.replay.telemetry import MAGIC
 from fluxproof.diagnosis.replay.telemetry_stream import values
 from fluxproof.plant import IMPOSED_SPEED
 from fluxproof.watch.commissioning import Page, Story, Watched
@@ -147,6 +148,25 @@ def test_command_on_a_file(words, tmp_path, capsys):
     for wrong in ("tcp://host", "tcp://host:0", "tcp://:5"):
         with pytest.raises(DriveError, match="expected tcp://HOST:PORT"):
             source_of(wrong)
+
+
+def test_what_brings_no_row_is_told(tmp_path, capsys):
+    """A dump, a file of something else, an empty one, a port where nobody answers: one line, exit status 2."""
+    dump, text, empty = tmp_path / "run.fluxdump", tmp_path / "run.csv", tmp_path / "run.bin"
+    dump.write_bytes(MAGIC + bytes(100))
+    text.write_text("time,i_a,i_b\n" * 20)
+    empty.write_bytes(b"")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        nobody = f"tcp://127.0.0.1:{free.getsockname()[1]}"
+    said = {str(dump): "this is a dump", str(text): "none of its 260 bytes is a packet"}
+    said |= {str(empty): "the file is empty", nobody: "no row has come: nobody answers (Connection refused)"}
+    for source, words in said.items():
+        command = ["watch", source, "--drive", str(PAPER), "--no-page", "--every", "0", "--seconds", "0.2"]
+        assert main(command) == 2
+        told = capsys.readouterr()
+        assert words in told.err and source in told.err, told
+        assert ("nobody answers" in told.out) == (source == nobody), told
 
 
 def test_server_in_c(words, tmp_path):

@@ -6,8 +6,14 @@ Torque steps of i_q both ways, the place of the shaft [electrical rad] from the 
     theta = theta_0 + omega_0*t + K*(double integral of i_q) - b*(of sign(omega)) - c*(of omega)
     K = 1.5*p^2*psi/J;    b = p*T_coulomb/J;    c = B/J
 
-Each step has its own theta_0 and omega_0.  Held speeds of both senses, with a current in the d axis of both signs, so
-that the direction of the dead time's voltage V_1 is known:
+Each step has its own theta_0 and omega_0; omega is the fit's own.  A dead time makes every pulse late by half of it,
+whatever the sign of the current: the valley, where the current is sampled, lies T_dead/2 before the middle of the zero
+voltage, in which the current falls by (R*i_q + omega*psi)/L_q:
+
+    i_q sampled = i_q*(1 + R*T_dead/(2*L_q)) + omega*psi*T_dead/(2*L_q)
+
+so that the K of the fit is too small by the bracket, and its c too large by K*psi*T_dead/(2*L_q).  Held speeds of both
+senses, with a current in the d axis of both signs, so that the direction of the dead time's voltage V_1 is known:
 
     u_q = R*i_q + V_1*i_q/|i| + w_e*(psi + L_d*i_d)
     u_d = R*i_d + V_1*i_d/|i| - w_e*L_q*i_q + w_e*psi*sin(error)
@@ -19,6 +25,7 @@ speed is held with both signs of i_d: an error of V_1's direction changes its si
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,6 +37,8 @@ OF_RATED, OF_VOLTAGE = 0.5, 0.45  # the speed reached: of the rated one, of the 
 CYCLES, LONGEST_S, LEAST_ROWS, ROWS = 2, 4.0, 30, 400  # torque steps
 MOVES = 0.1  # of that speed: less is no motion
 LEFT_OUT = 0.08  # of a step, at its begin
+HALL_FROM = 0.4  # of the highest speed: Hall sensors, whose angle between the edges is that of the last sector's speed
+FITS = 4  # with the speed of the fit before; the third changes nothing that counts
 D_CURRENT, LARGEST_I_Q = 0.35, 0.7  # of the limit, held speeds
 SPEED_HZ, FILTER_HZ, HELD_S, ROWS_HELD = 4.0, 40.0, 0.3, 300
 NEAR, ARRIVE_S = 0.02, 3.0  # of the speed
@@ -74,25 +83,8 @@ def inertia(session: Session) -> Step:
             f"the shaft does not turn: {factor * s.limit:.3g} A bring it to {abs(slow):.3g} electrical rad/s in "
             f"{LONGEST_S:.0f} s, expected {MOVES * top:.3g}; check the load, the brake and the inertia"
         )
-    pairs, sensors = m.pole_pairs, s.drive.sensors
-    count, blocks, values = len(pieces), [], []
-    for n, piece in enumerate(pieces):
-        first = max(int(LEFT_OUT * len(piece.t)), 1)
-        t = piece.t[first:] - piece.t[first]
-        theta = (-1.0 if sensors.position_reverse else 1.0) * s.code_pairs * TURN_RAD * piece.code[first:]
-        own = np.zeros((len(t), 2 * count))
-        own[:, 2 * n], own[:, 2 * n + 1] = 1.0, t
-        parts = (piece.i_q[first:], -np.sign(piece.omega_me[first:]), -piece.omega_me[first:])
-        blocks.append(np.column_stack([own, *(_integral(t, _integral(t, part)) for part in parts)]))
-        values.append(theta)
-    matrix, values = np.vstack(blocks), np.concatenate(values)
-    scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-30)
-    found, sigma, rms = solve(matrix / scale, values)
-    rest = values - matrix / scale @ found
-    like = float(np.clip(np.corrcoef(rest[1:], rest[:-1])[0, 1], 0.0, 0.99))
-    sigma = sigma * math.sqrt((1.0 + like) / (1.0 - like))  # residuals of neighbours resemble each other
-    k, b, c = (found / scale)[-3:]
-    s_k, s_b, s_c = (sigma / scale)[-3:]
+    pairs = m.pole_pairs
+    (k, b, c), (s_k, s_b, s_c), rms = torque_fit([_moving(s, piece) for piece in pieces])
     if k <= 0.0:
         raise Refusal(
             f"a positive torque current turns the shaft backward ({k:.3g} rad/s2 per A): the encoder's offset or "
@@ -104,6 +96,70 @@ def inertia(session: Session) -> Step:
     quantities = {"acceleration_per_a": Value(k, s_k, "rad/s2/A")}
     said = f"{k:.4g} +-{s_k:.1g} electrical rad/s2 per A, friction {b / k:.2g} A, rms {math.degrees(rms):.2g} degrees"
     return Step("inertia", quantities, said, {"k": [k, s_k], "b": [b, s_b], "c": [c, s_c]})
+
+
+@dataclass(frozen=True)
+class Moving:
+    """A torque step without its begin: time [s], place [electrical rad], current [A], speed, as the core sees them.
+
+    ``told``: the rows whose place the encoder tells.
+    """
+
+    t: np.ndarray
+    theta: np.ndarray
+    current: np.ndarray
+    omega: np.ndarray
+    told: np.ndarray
+
+
+def _moving(s: Session, piece: Seen) -> Moving:
+    """Hall sensors tell the place while the speed changes little within a sector, by (1/6 turn)*(change/speed)."""
+    first = max(int(LEFT_OUT * len(piece.t)), 1)
+    t, omega = piece.t[first:] - piece.t[first], piece.omega_me[first:]
+    turns = (-1.0 if s.drive.sensors.position_reverse else 1.0) * s.code_pairs * TURN_RAD
+    told = np.abs(omega) > (HALL_FROM * np.abs(omega).max() if s.coarse else -1.0)
+    return Moving(t, turns * piece.code[first:], piece.current[first:], omega, told)
+
+
+def torque_fit(pieces: list[Moving]) -> tuple[np.ndarray, np.ndarray, float]:
+    """((K, b, c), their standard uncertainties, rms of the place [rad]).
+
+    What repeats in all rows of a step (a current's ripple that the snapshots met, a cogging torque) is in no residual
+    of neighbours: of the residuals' uncertainty and that of leaving out one step after another the larger counts.
+    """
+    found, sigma, rms = _fit(pieces)
+    without = np.array([_fit([p for p in pieces if p is not one])[0] for one in pieces])
+    spread = np.sqrt((len(pieces) - 1) * without.var(axis=0))
+    return found, np.maximum(sigma, spread), rms
+
+
+def _fit(pieces: list[Moving]) -> tuple[np.ndarray, np.ndarray, float]:
+    """((K, b, c), standard uncertainties of the residuals, their rms).
+
+    The core's speed lags by its filter, so that the friction would turn its sign too late, and its angle is wrong
+    between the edges of Hall sensors: from the second fit on, speed and angle are those of the fit before.
+    """
+    theta, told = np.concatenate([p.theta for p in pieces]), np.concatenate([p.told for p in pieces])
+    theta, speeds, currents = theta[told], [p.omega for p in pieces], [np.imag(p.current) for p in pieces]
+    for _ in range(FITS):
+        blocks = []
+        for n, (p, omega, i_q) in enumerate(zip(pieces, speeds, currents, strict=True)):
+            own = np.zeros((len(p.t), 2 * len(pieces)))
+            own[:, 2 * n], own[:, 2 * n + 1] = 1.0, p.t
+            parts = [_integral(p.t, part) for part in (i_q, -np.sign(omega), -omega)]
+            blocks.append(np.column_stack([own, *(_integral(p.t, part) for part in parts)]))
+            speeds[n] = np.column_stack([np.ones(len(p.t)), *parts])
+        whole = np.vstack(blocks)
+        matrix = whole[told]
+        scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-30)
+        found, sigma, rms = solve(matrix / scale, theta)
+        rest = theta - matrix / scale @ found
+        found, sigma = found / scale, sigma / scale
+        angles = np.split(whole @ found, np.cumsum([len(p.t) for p in pieces])[:-1])
+        currents = [np.imag(p.current * np.exp(1j * (p.theta - at))) for p, at in zip(pieces, angles, strict=True)]
+        speeds = [part @ np.r_[found[2 * n + 1], found[-3:]] for n, part in enumerate(speeds)]
+    like = float(np.clip(np.corrcoef(rest[1:], rest[:-1])[0, 1], 0.0, 0.99))
+    return found[-3:], sigma[-3:] * math.sqrt((1.0 + like) / (1.0 - like)), rms  # neighbours resemble each other
 
 
 def _integral(t: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -235,6 +291,9 @@ def judge(s: Session, first: Step, points: list[np.ndarray], v_1: float) -> Step
             "R, L and psi do not describe this machine"
         )
     k, b, c = (first.notes[name] for name in "kbc")
+    early = s.drive.inverter.dead_time_s / (2.0 * m.inductance_q_h)
+    c = (c[0] - k[0] * psi * early, c[1])
+    k = (k[0] * (1.0 + m.resistance_ohm * early), k[1])
     ratio = 1.5 * m.pole_pairs**2 * psi
     j = ratio / k[0]
     s_j = j * math.hypot(k[1] / k[0], s_psi / psi)

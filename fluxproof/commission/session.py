@@ -22,6 +22,7 @@ from golden_model.units import TURN_RAD, from_si, to_si
 
 STOP_OF_LIMIT = 1.05  # of the current limit: a snapshot above ends the commissioning
 TRIPPED = 1 << 1  # of the register flags
+LEAST_OF_BUS = 0.1  # of the nominal bus voltage: below it no gain of the legs is formed
 LOOK_S = 5e-3  # between two looks at the currents
 OF_HEARTBEAT, LEAST_HEARTBEAT_S = 1.0 / 3.0, 4.0 * LOOK_S  # longest wait without a write; what such a host can keep
 # Nothing that rests on the machine's data acts during commissioning, and no limit of a speed that is forced.
@@ -55,7 +56,8 @@ class Step:
 class Seen:
     """Snapshots in sequence as arrays in SI units: ``t``, i_d, i_q, u_d, u_q, omega_me, u_dc, theta_me, adc_x, code.
 
-    ``code``: the encoder's place [mechanical turns], unwrapped from its first value within a turn.
+    ``code``: the encoder's place [mechanical turns], unwrapped from its first value within a turn.  ``u_d``, ``u_q``
+    are the voltages behind the devices, ``voltage_gain`` times those of the registers.
     """
 
     def __init__(self, drive: Drive, rows: list[dict], times: list[float]):
@@ -65,6 +67,8 @@ class Seen:
         self.i_d, self.i_q, self.u_d, self.u_q, self.omega_me, self.u_dc = (
             to_si(name, columns[name], drive) for name in names
         )
+        gain = voltage_gain(drive, self.u_dc)
+        self.u_d, self.u_q = gain * self.u_d, gain * self.u_q
         self.theta_me = np.unwrap(to_si("theta_me", columns["theta_me"], drive))
         self.adc = np.array([columns[f"snap_adc_{x}"] for x in "abc"]).T
         turns = 2.0**-drive.sensors.position_bits
@@ -78,6 +82,17 @@ class Seen:
     @property
     def voltage(self) -> np.ndarray:
         return self.u_d + 1j * self.u_q
+
+
+def voltage_gain(drive: Drive, u_dc: np.ndarray) -> np.ndarray:
+    """The leg's mean voltage per commanded one, of unequal thresholds of switch and diode.
+
+    With the duty d a leg loses ``d*v_switch + (1 - d)*v_diode`` at i > 0 and ``-(1 - d)*v_switch - d*v_diode`` at
+    i < 0: half their sum with the sign of i, which V_dead has, and ``(d - 1/2)*(v_switch - v_diode)`` at either sign,
+    which is a share of the voltage ``(d - 1/2)*u_dc``.
+    """
+    i = drive.inverter
+    return 1.0 + (i.v_diode_v - i.v_switch_v) / np.maximum(u_dc, LEAST_OF_BUS * i.dc_bus_v)
 
 
 class Session:

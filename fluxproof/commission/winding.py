@@ -51,6 +51,7 @@ UNKNOWN_SWING = 60.0  # rad/s, without an inertia in the file
 MISFIT = 0.03  # of the voltages, rms
 LARGEST_SIGMA = 0.03  # of R and L
 ORDERS = (1, -1, -5, 7, 5, -7, -11, 13)
+REPEATED = 2.0  # what the equation leaves is its own error rather than noise, and the run of the other sense repeats it
 GRID = TURN_RAD / 720 * np.arange(720)  # phi, to find the harmonics of the signs
 
 
@@ -172,6 +173,16 @@ def _to_the_middle(s: Session) -> None:
     s.ramp(PARKED_S, i_d_ref=(PARTS[-1] * s.limit, 0.0))
 
 
+def held(flux: float, henry: float) -> float:
+    """L [H] of the regression's, of a voltage that stands still for a period T; ``flux`` is R*T.
+
+    The current follows i(k+1) = a*i(k) + (1 - a)/R*u with a = exp(-R*T/L).  Turned by half a step, u/i is
+    R*cos(w*T/2) + j*R*coth(R*T/(2*L))*sin(w*T/2), of which the regression takes R*coth(x) as 2*L/T.
+    """
+    x = flux / (2.0 * henry) if henry else 1.0
+    return flux / (2.0 * math.atanh(x)) if 0.0 < x < 1.0 else henry
+
+
 def judge(s: Session, points: list[Point]) -> Step:
     """One regression over all runs; unknowns R, L_d, L_q, V_dead, K, V_dead*i_0."""
     rows, values, sizes = [], [], []
@@ -197,8 +208,10 @@ def judge(s: Session, points: list[Point]) -> Step:
         rest = values - matrix @ found
         for kind in (0, 1):
             weights[kind::2] = 1.0 / max(math.sqrt(float(np.mean(rest[kind::2] ** 2))), 1e-9)
+    sigma = np.multiply(sigma, math.sqrt(REPEATED))
     misfit = math.sqrt(float(np.mean(rest**2)) * 2.0 / float(np.mean(np.square(sizes))))
     (r, l_d, l_q, v_dead, k, lead), (s_r, s_l_d, s_l_q, s_v, s_k, _) = found, sigma
+    l_d, l_q = (held(r * s.t_s, x) for x in (l_d, l_q))
     if misfit > MISFIT:
         raise Refusal(
             f"R and L explain the voltages within {100 * misfit:.1f} % only, expected {100 * MISFIT:.0f} %: saturation "

@@ -13,6 +13,7 @@ from fluxproof.files import write_text
 from fluxproof.quote import put
 from fluxproof.stage import alone
 
+CHECKS_R = {"km2", "tau_m", "tau_e"}  # what states R beside r, see ``checks``
 CONTRADICTS = 1  # exit status, also of an ambiguity: no [machine] is written
 EXAMPLE = """\
 one argument for each number, with its unit, and how it is meant where the data sheet states it:
@@ -20,10 +21,10 @@ one argument for each number, with its unit, and how it is meant where the data 
   fluxproof constants pole_pairs=7 "kv=270 rpm/V" "r=39 mohm phase" "l=15.7 uH phase"
 names and units:
   pole_pairs, poles
-  kt  Nm/A, Nm/Arms, Nm/Apk, mNm/A; dc (block commutation)      kv  rpm/V
+  kt  Nm/A, Nm/Arms, Nm/Apk, mNm/A, oz-in/A, lb-in/A; dc (block commutation)      kv  rpm/V
   ke  V/krpm, V/rpm, mV/rpm, Vs/rad; Vrms, Vpk; line, phase      flux  Wb, mWb, V/Hz
   r  ohm, mohm; line, phase, winding      l, ld, lq  H, mH, uH; line, phase, winding
-  j  kgm2, kgcm2, gcm2    i  A; rms, peak    n  rpm (rated)    n0  rpm and u  V (no load)
+  j  kgm2, kgcm2, gcm2, oz-in-s2, lb-in-s2    i  A; rms, peak, dc    n  rpm (rated)    n0  rpm and u  V (no load)
 checks: km  Nm/sqrtW    gradient  rpm/mNm    tau_m, tau_e  s, ms
 Every number that is added is a check of the others."""
 
@@ -50,7 +51,11 @@ def run(args: argparse.Namespace) -> int:
     if args.out:
         with alone(Path(args.out)) as file:
             write_text(file, "\n".join(lines) + "\n")
-    put("\n".join([*lines, "", *read_as(answer.machines[0]), *implied_lines(answer.machines[0])]))
+    put(
+        "\n".join(
+            [*lines, "", *read_as(answer.machines[0]), *implied_lines(answer.machines[0]), *doubts(answer.machines[0])]
+        )
+    )
     return 0
 
 
@@ -58,13 +63,13 @@ def machine_lines(machine: Machine) -> list[str]:
     """[machine] of a drive file; what the data sheet does not state is a comment with what is needed."""
     rows = [
         ("pole_pairs", machine.pole_pairs, ""),
-        ("resistance_ohm", machine.r, "of a phase: add r=0.76 ohm line"),
-        ("inductance_d_h", machine.l_d, "of a phase: add l=12 mH line, or ld and lq"),
-        ("inductance_q_h", machine.l_q, "of a phase: add l=12 mH line, or ld and lq"),
+        ("resistance_ohm", machine.r, "of a phase: not stated; add it, for example r=0.76 ohm line"),
+        ("inductance_d_h", machine.l_d, "of a phase: not stated; add it, for example l=12 mH line, or ld and lq"),
+        ("inductance_q_h", machine.l_q, "of a phase: not stated; add it, for example l=12 mH line, or ld and lq"),
         ("magnet_flux_wb", machine.psi, ""),
-        ("rated_current_a", machine.i, "peak: add i=14.9 Arms"),
-        ("rated_speed_rad_s", machine.omega, "of the shaft: add n=2350 rpm"),
-        ("inertia_kgm2", machine.j, "of rotor and load: add j=85 gcm2"),
+        ("rated_current_a", machine.i, "peak: not stated; add it, for example i=14.9 Arms"),
+        ("rated_speed_rad_s", machine.omega, "of the shaft: not stated; add it, for example n=2350 rpm"),
+        ("inertia_kgm2", machine.j, "of rotor and load: not stated; add it, for example j=85 gcm2"),
     ]
     stated = [f"{key} = {value:.6g}" if value is not None else f"# {key}: {need}" for key, value, need in rows]
     return ["[machine]", *stated]
@@ -95,6 +100,21 @@ def implied_lines(machine: Machine) -> list[str]:
         lines[-1] += f", mechanical time constant {implied['tau_m'] * 1e3:.4g} ms"
     if "tau_e" in implied:
         lines[-1] += f", electrical time constant {implied['tau_e'] * 1e3:.4g} ms"
+    return lines
+
+
+def doubts(machine: Machine) -> list[str]:
+    """What contradicts nothing and yet may be wrong: a resistance that no other number checks, or that takes most."""
+    lines, targets = [], {statement.target for statement, _ in machine.meanings}
+    if machine.r and not targets & CHECKS_R:
+        lines.append("no number here checks the resistance: add km or gradient, tau_e with l, or tau_m with j")
+    if machine.r and machine.i and machine.omega:
+        drop, emf = machine.r * machine.i, machine.pole_pairs * machine.psi * machine.omega
+        if drop > emf:
+            lines.append(
+                f"doubt: at rated current and speed the resistance takes {drop:.3g} V and the EMF is {emf:.3g} V "
+                "(of a phase, peak): more heat than shaft power; check r, i and n"
+            )
     return lines
 
 

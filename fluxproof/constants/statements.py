@@ -10,6 +10,7 @@ The machine (star equivalent, peak values, shaft speed omega, pole pairs p, flux
     EMF of a phase         p psi omega           between two lines  sqrt(3) p psi omega
     torque per ampere      1.5 p psi (peak)      1.5 sqrt(2) p psi (rms)       sqrt(3) p psi (DC, two phases conduct)
     torque per sqrt(loss)  K_m^2 = 1.5 p^2 psi^2 / R: the same in every convention
+    a DC of block commutation has the torque, and the loss, of sinusoidal currents whose peak is 2/sqrt(3) of it
     R, L of a phase        half of what lies between two lines; a third of one winding in delta
 """
 
@@ -65,6 +66,7 @@ class Quantity(NamedTuple):
 _EMF = {"line rms": ROOT2 / ROOT3, "line peak": 1 / ROOT3, "phase rms": ROOT2, "phase peak": 1.0}
 _TORQUE = {"rms": 1 / (1.5 * ROOT2), "peak": 1 / 1.5, "dc": 1 / ROOT3}
 _WINDING = {"line": 0.5, "phase": 1.0, "winding": 1.0}
+_OZ_IN, _LB_IN = 0.0070615518, 0.1129848290  # Nm
 _OHM = {"ohm": 1.0, "Ohm": 1.0, "Ω": 1.0, "mohm": 1e-3, "mOhm": 1e-3, "mΩ": 1e-3}
 _HENRY = {"H": 1.0, "mH": 1e-3, "uH": 1e-6, "µH": 1e-6}
 _SECOND = {"s": 1.0, "ms": 1e-3}
@@ -73,7 +75,7 @@ _SPEED = {"rpm": RPM, "1/min": RPM, "rad/s": 1.0}
 QUANTITIES = {
     "pole_pairs": Quantity("p", {"": 1.0}),
     "poles": Quantity("p", {"": 0.5}),
-    "kt": Quantity("p_psi", {"Nm/A": 1.0, "mNm/A": 1e-3}, _TORQUE),
+    "kt": Quantity("p_psi", {"Nm/A": 1.0, "mNm/A": 1e-3, "oz-in/A": _OZ_IN, "lb-in/A": _LB_IN}, _TORQUE),
     "ke": Quantity(
         "p_psi",
         {"V/krpm": 1e-3 / RPM, "V/rpm": 1 / RPM, "mV/rpm": 1e-3 / RPM, "mVmin": 1e-3 / RPM, "Vs/rad": 1.0,
@@ -86,12 +88,14 @@ QUANTITIES = {
     "l": Quantity("l", _HENRY, _WINDING),
     "ld": Quantity("l_d", _HENRY, _WINDING),
     "lq": Quantity("l_q", _HENRY, _WINDING),
-    "j": Quantity("j", {"kgm2": 1.0, "kgcm2": 1e-4, "gcm2": 1e-7, "kgmm2": 1e-6}),
-    "i": Quantity("i", {"A": 1.0}, {"rms": ROOT2, "peak": 1.0}),
+    "j": Quantity(
+        "j", {"kgm2": 1.0, "kgcm2": 1e-4, "gcm2": 1e-7, "kgmm2": 1e-6, "oz-in-s2": _OZ_IN, "lb-in-s2": _LB_IN}
+    ),
+    "i": Quantity("i", {"A": 1.0}, {"rms": ROOT2, "peak": 1.0, "dc": 2 / ROOT3}),
     "n": Quantity("omega", _SPEED),
     "n0": Quantity("omega_0", _SPEED),
     "u": Quantity("u", {"V": 1.0}),
-    "km": Quantity("km2", {"Nm/sqrtW": 1.0, "Nm/√W": 1.0, "mNm/sqrtW": 1e-3}, square=True),
+    "km": Quantity("km2", {"Nm/sqrtW": 1.0, "Nm/√W": 1.0, "mNm/sqrtW": 1e-3, "oz-in/sqrtW": _OZ_IN}, square=True),
     "gradient": Quantity("km2", {"rpm/mNm": 1e3 * RPM, "rpm/Nm": RPM, "rad/s/Nm": 1.0}, invert=True),
     "tau_m": Quantity("tau_m", _SECOND),
     "tau_e": Quantity("tau_e", _SECOND),
@@ -156,7 +160,8 @@ def _unit(text: str, quantity: Quantity, parts: list[str]) -> tuple[str, set[str
         said.add("peak" if "pk" in unit or "peak" in unit else "rms")
     if plain not in quantity.units:
         known = ", ".join(u or "no unit" for u in quantity.units)
-        raise DriveError(f"{text!r}: the unit {unit!r} is not known here; expected one of {known}")
+        what = f"the unit {unit!r} is not known here" if unit else "the unit is missing"
+        raise DriveError(f"{text!r}: {what}; expected one of {known}")
     return plain, said
 
 

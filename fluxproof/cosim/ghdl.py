@@ -126,8 +126,11 @@ def run(
 
 
 def waves(folder: Path) -> list[str]:
-    """GHDL's option for the waveform of a run where FLUXPROOF_WAVES is set; only FST takes every top."""
-    return [f"--fst={folder / 'waves.fst'}"] if os.environ.get("FLUXPROOF_WAVES") else []
+    """GHDL's option for the waveform of a run where FLUXPROOF_WAVES is set; only FST takes every top.
+
+    The path is absolute: a simulator works in a folder of its own.
+    """
+    return [f"--fst={folder.resolve() / 'waves.fst'}"] if os.environ.get("FLUXPROOF_WAVES") else []
 
 
 def _log(folder: Path, name: str) -> Path:

@@ -83,7 +83,7 @@ def make_example(out: Path, progress) -> tuple[list[Path], Path]:
     """Write the example's recording and drive file to ``out``; ([recording], drive file)."""
     from fluxproof.diagnosis.example.recording import write
 
-    progress("the golden core drives the motor of the example; the first run compiles it, half a minute")
+    progress("the golden core drives the motor of the example; the first run compiles it, some 50 s of processor time")
     example = write(out)
     return [example.recording], example.drive
 

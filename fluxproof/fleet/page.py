@@ -29,10 +29,9 @@ def write_page(out: Path, found: Findings) -> Path:
 
 def render(found: Findings) -> str:
     """The page as one string."""
-    drives = sum(len(d.serials) for d in found.designs)
     context = {
         "found": found,
-        "drives": drives,
+        "drives": found.drives,
         "headline": headline(found),
         "mood": "open" if any(d.outliers or d.drifts or d.groups for d in found.designs) or found.failed else "good",
         "verdicts": pictures.verdicts(found.verdicts) if found.verdicts else None,
@@ -56,8 +55,7 @@ def headline(found: Findings) -> str:
         _count(len(found.failed), "recording could not be used", "recordings could not be used"),
     ]
     said = ", ".join(part for part in parts if part) or "no drive differs"
-    drives = sum(len(d.serials) for d in found.designs)
-    return f"{_count(found.count, 'recording', 'recordings')} of {_count(drives, 'drive', 'drives')}: {said}."
+    return f"{_count(found.count, 'recording', 'recordings')} of {_count(found.drives, 'drive', 'drives')}: {said}."
 
 
 def _count(n, one, many) -> str:

@@ -42,7 +42,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Watch until Ctrl-C or --seconds; 1 if a bit differed from the golden model."""
+    """Watch until Ctrl-C or --seconds; 1 if a bit differed from the golden model, DriveError if no row came."""
     from fluxproof.watch.explain import Explainer  # numba and pyarrow take a second
     from fluxproof.watch.live import Live
     from fluxproof.watch.replay import LiveReplay
@@ -87,6 +87,8 @@ def run(args: argparse.Namespace) -> int:
         put(f"explanation: {explainer.found[-1].verdict}: {explainer.found[-1].text}")
     if live.failure is not None:
         raise live.failure
+    if not live.total:
+        raise DriveError(f"{args.source}: no row has come: {source.why_silent()}")
     return 1 if live.replay.difference else 0
 
 

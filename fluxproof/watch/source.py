@@ -8,6 +8,8 @@ import socket
 import time
 from typing import Protocol
 
+from fluxproof.diagnosis.replay.telemetry import MAGIC
+from fluxproof.quote import say
 from golden_model.drive_keys import DriveError
 
 CHUNK = 1 << 18
@@ -26,6 +28,10 @@ class Source(Protocol):
         ...
 
     def close(self) -> None: ...
+
+    def why_silent(self) -> str:
+        """Why no row has come, of what this source knows; what was expected."""
+        ...
 
 
 def source_of(text: str) -> Source:
@@ -47,6 +53,14 @@ class GrowingFile:
             self.file = open(path, "rb", buffering=0)  # noqa: SIM115 - closed by close()
         except OSError as error:
             raise DriveError(f"{path}: cannot be read: {error.strerror or error}") from None
+        begin = self.file.read(len(MAGIC)) or b""
+        if begin == MAGIC:
+            self.file.close()
+            raise DriveError(
+                f"{path}: this is a dump, a recording that has ended: diagnose it with 'fluxproof diagnose'; watch "
+                "expects the raw capture, the packets as the DMA stores them"
+            )
+        self.file.seek(0)
 
     def read(self) -> bytes:
         data = self.file.read(CHUNK) or b""
@@ -68,6 +82,11 @@ class GrowingFile:
     def close(self) -> None:
         self.file.close()
 
+    def why_silent(self) -> str:
+        if not self.at:
+            return "the file is empty, expected packets of the core's telemetry: is the capture running?"
+        return f"none of its {self.at:,} bytes is a packet, expected the core's telemetry as the DMA stores it"
+
 
 class Tcp:
     """A connection that is made again when it breaks, at intervals up to MOST_RETRY_S."""
@@ -76,6 +95,7 @@ class Tcp:
         self.host, self.port, self.breaks = host, port, 0
         self.socket: socket.socket | None = None
         self.wait_s, self.again_at = RETRY_S, 0.0
+        self.answered, self.bytes, self.refused = False, 0, ""  # ever; ``refused``: the reason of the last attempt
 
     def read(self) -> bytes:
         if self.socket is None and not self._connect():
@@ -91,6 +111,7 @@ class Tcp:
         if not data:
             self.close()
             self.breaks += 1
+        self.bytes += len(data)
         return data
 
     def _connect(self) -> bool:
@@ -99,14 +120,26 @@ class Tcp:
         try:
             self.socket = socket.create_connection((self.host, self.port), timeout=1.0)
             self.socket.settimeout(0.2)
-        except OSError:
+        except OSError as error:
+            if not self.answered and not self.refused:
+                say(f"{TCP}{self.host}:{self.port}: nobody answers ({error.strerror or error}); tried until it does")
+            self.refused = error.strerror or str(error)
             self.again_at = time.monotonic() + self.wait_s
             self.wait_s = min(2.0 * self.wait_s, MOST_RETRY_S)
             return False
-        self.wait_s = RETRY_S
+        self.wait_s, self.answered = RETRY_S, True
         return True
 
     def close(self) -> None:
         if self.socket is not None:
             self.socket.close()
             self.socket = None
+
+    def why_silent(self) -> str:
+        if not self.answered:
+            return (
+                f"nobody answers ({self.refused or 'no attempt has ended'}), expected a telemetry server at this port"
+            )
+        if not self.bytes:
+            return "the server is connected and sends nothing: is the core sampling?"
+        return f"none of the {self.bytes:,} bytes is a packet, expected those of docs/software/telemetry_server.c"

@@ -48,6 +48,9 @@ class Verilated:
     def close(self) -> None:
         self.ending.set()
 
+    def why_silent(self) -> str:
+        return "the simulation has made no sample yet, expected one after some seconds: leave it more --seconds"
+
     def _run(self) -> None:
         try:
             while not self.ending.is_set():

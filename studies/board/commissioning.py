@@ -28,6 +28,15 @@ TARGETS = {  # error of an accepted motor: (largest, unit)
     "L_q": (3.0, "%"),
     "psi": (1.0, "%"),
 }
+MEASURED = {  # keys of [machine] and their names among the steps' values
+    "resistance_ohm": "resistance",
+    "inductance_d_h": "inductance_d",
+    "inductance_q_h": "inductance_q",
+    "magnet_flux_wb": "magnet_flux",
+    "inertia_kgm2": "inertia",
+    "coulomb_friction_nm": "coulomb_friction",
+    "viscous_friction_nms": "viscous_friction",
+}
 
 
 @dataclass
@@ -73,8 +82,7 @@ def compare(motor: Case, found, steps: list[Step], peak_a: float) -> Outcome:
     errors["encoder angle"] = abs(math.degrees(angle))
     errors["current offset"] = float(np.sqrt(np.mean(offsets**2)))
     values = {name: value for step in steps for name, value in step.values.items()}
-    keys = {"R": "resistance", "L_d": "inductance_d", "L_q": "inductance_q", "psi": "magnet_flux"}
-    ratio = {n: (percent[n] - 1.0) * values[k].value / percent[n] / values[k].sigma for n, k in keys.items()}
+    ratio = {key: (getattr(n, key) - getattr(m, key)) / values[name].sigma for key, name in MEASURED.items()}
     ratio["encoder angle"] = angle / values["theta_offset"].sigma
     return Outcome(
         motor.seed,

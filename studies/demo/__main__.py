@@ -35,6 +35,13 @@ PAPER, EMRAX = DRIVES / "paper001.toml", DRIVES / "emrax228.toml"
 CARRIER = 100
 GHDL_PERIODS, GHDL_ROWS = 150, 200
 LEAST_PERIODS, LEAST_GHDL_PERIODS = 3000, 150
+# What comes before the first period, by the names of the steps.
+PREPARED = {
+    "kernels of the golden": "compiling the golden model",
+    "kernels of the plant": "compiling the plant",
+    "Fig. 9 in Verilator, build": "converting the VHDL to Verilog and building it",
+    "analyse": "building the VHDL in GHDL",
+}
 
 
 class Lane(threading.Thread):
@@ -44,10 +51,11 @@ class Lane(threading.Thread):
         super().__init__(daemon=True)
         self.steps = steps
         self.seconds: list[tuple[str, float]] = []  # what each step took
+        self.now = ""  # the step that runs
 
     def run(self) -> None:
         for step in self.steps:
-            began = time.monotonic()
+            began, self.now = time.monotonic(), step_name(step)
             step()
             self.seconds.append((step_name(step), round(time.monotonic() - began, 1)))
 
@@ -65,6 +73,14 @@ class Progress:
         self.jobs, self.out = jobs, out
         self.began: dict[Job, tuple[float, int]] = {}
         self.shown: dict[Job, int] = {}
+        self.prepared: set[str] = set()
+
+    def prepare(self, lanes: list[Lane]) -> None:
+        """A line at the begin of each step that is no job, which may take minutes where nothing is compiled yet."""
+        for name in (lane.now for lane in lanes):
+            if name in PREPARED and name not in self.prepared:
+                self.prepared.add(name)
+                print(f"{PREPARED[name]}; up to some minutes the first time", file=self.out, flush=True)
 
     def show(self, done: dict[Job, int], now: float) -> None:
         for s in self.jobs:
@@ -112,6 +128,7 @@ def watch(lanes: list[Lane], jobs: list[Job], out=sys.stdout, pause: float = 0.5
     for lane in lanes:
         lane.start()
     while any([lane.is_alive() for lane in lanes]):
+        progress.prepare(lanes)
         progress.show({job: job.done() for job in jobs}, time.monotonic())
         time.sleep(pause)
     progress.show({job: job.done() for job in jobs}, time.monotonic())

@@ -44,6 +44,12 @@ class Findings:
     failed: list[dict]
     count: int
 
+    @property
+    def drives(self) -> int:
+        """How many drives there are: also those whose recordings could not be used."""
+        diagnosed = {serial for design in self.designs for serial in design.serials}
+        return sum(len(d.serials) for d in self.designs) + len({row["serial"] for row in self.failed} - diagnosed)
+
 
 def findings(rows: list[dict], limits: dict[str, str] | None = None) -> Findings:
     """The findings of the rows of fleet.parquet; limits: see drift.drifts."""
