@@ -92,7 +92,8 @@ def _of_the_core(path) -> None:
     drive = load(path)
     register_set = board_set(drive)
     assert bases_lines(drive, register_set) and table(register_set.rows) and c_lines(str(path), drive, register_set)
-    assert render.files(str(path), drive, register_set, PART, parts.ZYNQ, parts.ZYNQ.base, "")
+    project = render.Project(str(path), drive, register_set, PART, parts.ZYNQ.base, "", False)
+    assert render.files(project, parts.ZYNQ)
 
 
 def _of_the_scene(path) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from fluxproof.checkout import ROOT, RTL
@@ -138,7 +139,7 @@ def render(rtl: Path = RTL) -> str:
             f"  {name}:",
             "    datatype: int",
             f"    default: {default}",
-            f"    description: {doc}",
+            f"    description: {json.dumps(doc)}",  # a colon or semicolon in it is no YAML
         ]
         parameters += ["    paramtype: vlogparam"]
     return CORE.format(

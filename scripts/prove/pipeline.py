@@ -94,6 +94,7 @@ PATTERNS = (
         "out_valid <= '1' when n = LATENCY else '0';",
         "out_valid <= '1' when n = LATENCY - 1 else '0';",
     ),
+    ("valid a clock early", "if age = LATENCY - 1 then", "if age = LATENCY - 2 then"),
     ("valid survives reset", "        valid(1 to LATENCY) <= (others => '0');\n", "        null;\n"),
     ("valid survives reset", "out_valid <= '0';", "null;"),
 )

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fluxproof.diagnosis.effects import beyond
 from fluxproof.diagnosis.ground import constants as k
 
 if TYPE_CHECKING:
@@ -76,21 +75,19 @@ def covariance_of(fit: FittedSet, name: str, full: np.ndarray) -> np.ndarray:
     return out
 
 
-def implausible(fit: FittedSet, name: str | None = None) -> float:
-    """How far the parameters of a set, or of one effect of it, are beyond what their effects declare as plausible.
+def log_implausible(fit: FittedSet, name: str | None = None) -> float:
+    """Log prior of the parameters of a set, or of one effect of it, beyond what their effects declare as plausible.
 
-    A parameter at the limit counts one, at twice the limit two: what no sensor does is no better than what none does
-    twice over.
+    ``IMPLAUSIBLE`` at the limit and ever less beyond it: a sensor that is off by half is no better than one that is off
+    by a sixth.
     """
-    return sum(_implausible(fit, n) for n in fit.names if name in (None, n))
+    far = [d for n in fit.names if name in (None, n) for d in _distances(fit, n) if d]
+    return float(sum(np.log(k.IMPLAUSIBLE) - k.FARTHER * np.log(d) for d in far))
 
 
-def _implausible(fit, name) -> float:
+def _distances(fit, name) -> list[float]:
     effect, nominal = fit.problem.setup.effects[name], fit.problem.view.nominal
-    if not effect.plausible:
-        return 0.0
-    found = effect.estimates(fit.c[name], covariance_of(fit, name, fit.cov), nominal)
-    return sum(beyond(found[key], limits, nominal) for key, limits in effect.plausible.items() if key in found)
+    return effect.distances(effect.estimates(fit.c[name], covariance_of(fit, name, fit.cov), nominal), nominal)
 
 
 def log_too_small(fit: FittedSet, names) -> float:

@@ -57,7 +57,7 @@ def run(path) -> None:
         return
     out = path.parent / "out"
     arguments = argparse.Namespace(
-        drive=str(drive), part=given["part"], core=given["core"], base=given["base"], out=str(out)
+        drive=str(drive), part=given["part"], core=given["core"], base=given["base"], hil=False, out=str(out)
     )
     failure = _printed(command.run, arguments)
     written = sorted(os.listdir(out)) if out.exists() else []
