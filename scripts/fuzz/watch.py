@@ -34,7 +34,8 @@ COMPILES = (
     "importlib",
     "reprlib.py",
 )
-INSTALLED = tuple({str(Path(p).resolve()) for p in (*sysconfig.get_paths().values(), sys.prefix, sys.base_prefix)})
+PLACES = (*sysconfig.get_paths().values(), sys.prefix, sys.base_prefix, *filter(None, [sys.pycache_prefix]))
+INSTALLED = tuple({str(Path(p).resolve()) for p in PLACES})
 OUR_CLASSES = ("golden_model.", "fluxproof.plant.")  # compiled kernels find the tuples that they return by pickle, in C
 OWN_LOADING = ("<frozen importlib", os.path.join("numba", "core", "caching.py"))
 SYSTEM = ("/proc/self/", "/proc/cpuinfo", "/proc/meminfo", "/sys/devices/system/", "/dev/null", "/dev/urandom", "/usr/")

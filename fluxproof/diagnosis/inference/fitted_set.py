@@ -78,11 +78,10 @@ def covariance_of(fit: FittedSet, name: str, full: np.ndarray) -> np.ndarray:
 def log_implausible(fit: FittedSet, name: str | None = None) -> float:
     """Log prior of the parameters of a set, or of one effect of it, beyond what their effects declare as plausible.
 
-    ``IMPLAUSIBLE`` at the limit and ever less beyond it: a sensor that is off by half is no better than one that is off
-    by a sixth.
+    The odds are ``IMPLAUSIBLE`` at the limit, their square at twice it: what no sensor does is no better than what none
+    does twice over.
     """
-    far = [d for n in fit.names if name in (None, n) for d in _distances(fit, n) if d]
-    return float(sum(np.log(k.IMPLAUSIBLE) - k.FARTHER * np.log(d) for d in far))
+    return float(np.log(k.IMPLAUSIBLE) * sum(d for n in fit.names if name in (None, n) for d in _distances(fit, n)))
 
 
 def _distances(fit, name) -> list[float]:

@@ -45,8 +45,8 @@ UNNAMED = (
 )
 CHANNEL = re.compile(r"(ch|channel|c|dev\d+[_/]ai|ai|probe)?[ _]?\d+|channel [a-d]", re.I)
 SCOPE = (
-    ". {} are channels of an instrument: state which signal each has, as an EMF run of a machine that is turned without "
-    "current (--column {}), or currents and duties of the control with the angle"
+    ". {} are channels of an instrument: state which signal each has, as an EMF run of a machine that is turned "
+    "without current (--column {}), or currents and duties of the control with the angle"
 )
 PROBES = {1: ("u_ab",), 2: ("u_ab", "u_bc"), 3: ("u_a", "u_b", "u_c")}
 LITTLE = (
