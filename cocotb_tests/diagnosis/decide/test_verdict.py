@@ -9,7 +9,7 @@ import pytest
 
 from fluxproof.diagnosis.decide.names import Names
 from fluxproof.diagnosis.decide.sizes import Size
-from fluxproof.diagnosis.decide.verdict import beside_suspects, kind_as_interpreted, kind_of, kind_of_one_point
+from fluxproof.diagnosis.decide.verdict import kind_as_interpreted, kind_of, kind_of_one_point
 
 NAMED, EITHER = Names({"a": 0.99}, (), {}), Names({}, (("a", "b"),), {})
 NOTHING, SUSPECT = Names({}, (), {}), Names({}, (), {}, {"s": 0.99})
@@ -63,13 +63,3 @@ def test_kind_under_an_interpretation():
     assert kind_as_interpreted("unexplained", 0.6, ("part",)) == "partly_explained"
     assert kind_as_interpreted("unexplained", 0.4, ("part",)) == "unexplained"
     assert kind_as_interpreted("ambiguous", 1.0, ()) == "ambiguous"
-
-
-@pytest.mark.parametrize(
-    "suspects, left, kind",
-    [(SUSPECT, 1.0, "partly_explained"), (SUSPECT, 50.0, "unexplained"), (NOTHING, 1.0, "unexplained")],
-)
-def test_a_cause_stays_named_beside_one_without_a_parameter(suspects, left, kind):
-    """A resistance beside unequal legs, which made two thirds of the voltage, was withheld as their imitation."""
-    names = Names({"resistance": 0.99}, (), {}, suspects.suspects)
-    assert beside_suspects("unexplained", names, sizes(100.0, left)) == kind

@@ -25,7 +25,7 @@ from fluxproof.diagnosis.decide.names import Names, names_of
 from fluxproof.diagnosis.decide.off_orders import Stray, row_residual, stray_order, stray_swing, stray_torque
 from fluxproof.diagnosis.decide.relevant import relevant_names
 from fluxproof.diagnosis.decide.sizes import Sizes, left_by, measured_torque
-from fluxproof.diagnosis.decide.verdict import at_floor, beside_suspects, is_usual, kind_of, without_imitations
+from fluxproof.diagnosis.decide.verdict import at_floor, is_usual, kind_of, without_imitations
 from fluxproof.diagnosis.effects import ShaftTorque
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.posterior import Posterior
@@ -66,8 +66,6 @@ def judge(posterior, held) -> Judgement:
     channel = train.primary()
     share = unseen.share(channel) if _is_counted(explaining, setup) else None
     kind = kind_of(names, train, unseen, channel, share, stray)
-    if not stray:
-        kind = beside_suspects(kind, names, _sizes(best, explaining | set(names.suspects), held))
     kind = without_imitations(kind, names, best)
     asserted = _beside_unknown(names, kind)
     return Judgement(searched, posterior, kind, asserted, names, explaining, channel, share, stray, train, unseen)

@@ -23,17 +23,6 @@ def kind_of(names, train, held, channel, share, stray) -> str:
     return "ambiguous" if names.ambiguous else "explained"
 
 
-def beside_suspects(kind, names, rest) -> str:
-    """The kind of a verdict where a cause without a parameter explains what the names leave: nothing is imitated.
-
-    rest: Sizes of what names and suspects leave together at held-out blocks.  A resistance beside unequal legs, which
-    make more of the voltage, was withheld.
-    """
-    if kind != "unexplained" or not names.asserted or not names.suspects:
-        return kind
-    return "partly_explained" if _is_whole(rest, {c: rest.share(c) for c in rest.channels}) else kind
-
-
 def without_imitations(kind, names, best) -> str:
     """The kind of a verdict where much is left: if that may imitate every name (credibility.py), nothing is explained.
 
