@@ -157,9 +157,9 @@ def test_held_messages_are_not_balanced_in_motion():
     assert stretches_in_motion(recording, nominal) is None
 
 
-@pytest.mark.parametrize("kind, name", [("angle", "sampling_skew"), ("filter", "delay"), ("iron", "iron_loss")])
+@pytest.mark.parametrize("kind, name", [("filter", "delay"), ("iron", "iron_loss")])
 def test_operating_points_show_what_is_late(kind, name, tmp_path):
-    """All three follow omega^2 on the d axis; a late angle and a late voltage were unknown in a table."""
+    """Both follow omega^2 on the d axis; a late voltage was unknown in a table."""
     (chosen,) = [c for c in late.cases() if c.name == f"late.drone_24v_table_{kind}"]
     (recording,), drive = chosen.files(tmp_path)
     nominal = load_nominal(drive)

@@ -23,11 +23,11 @@ def test_absurd_sizes_are_impossible():
     assert not possible(alone)
 
 
-@pytest.mark.parametrize("share, costs", [(0.95, 0.0), (0.6, 0.0), (0.4, np.log(0.4) / np.log(0.5)), (0.25, 2.0)])
+@pytest.mark.parametrize("share, costs", [(0.95, False), (0.6, False), (0.4, True)])
 def test_an_implausible_value_costs(share, costs, monkeypatch):
-    """The more the farther it is from half: else a sum of absurd effects that cancel is preferred to the true ones."""
+    """Else a sum of absurd effects that cancel is preferred to the true ones."""
     view = slow_view(log(Truth(psi_m=share * PSI), levels=LEVELS[:8]), NOMINAL)
     problem = Problem(Setup(view, view.visible(CATALOGUE), np.ones(len(view), bool)))
     priced = problem.fit(("magnet_flux",)).value
     monkeypatch.setattr(constants, "IMPLAUSIBLE", 1.0)
-    assert problem.fit(("magnet_flux",)).value - priced == pytest.approx(np.log(1e3) * costs, rel=0.01)
+    assert problem.fit(("magnet_flux",)).value - priced == pytest.approx(np.log(1e3) * costs)

@@ -40,7 +40,7 @@ def test_a_table_has_no_drift(tmp_path):
 
     seen = set(view.visible(CATALOGUE))
     assert not {"magnet_temperature", "emf_harmonics"} & seen
-    assert {"magnet_flux", "dead_time", "delay", "sampling_skew"} <= seen
+    assert {"magnet_flux", "dead_time", "delay"} <= seen
 
 
 def test_rounded_values_and_transients_of_a_slow_log(tmp_path):

@@ -6,8 +6,11 @@ voltages as a gain of all current sensors, and together with the magnet flux the
 voltage balance cannot separate them, so that the prior odds are those of a sensor as far off.
 """
 
+import numpy as np
+
 from fluxproof.diagnosis.effects import (
     Alternatives,
+    Chosen,
     Constant,
     FluxEffect,
     Parameter,
@@ -15,11 +18,11 @@ from fluxproof.diagnosis.effects import (
     sigma,
     torque_of,
 )
+from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.result import Estimate
 
 LARGEST, SMALLEST = 3.0, -0.714  # the shares of sensors whose readings are 0.25 and 3.5 times the true values
 IMPEDANCE = ("resistance_ohm", "inductance_d_h", "inductance_q_h")
-SENSOR = 0.1  # largest plausible error of the sensors that leave the same
 KEYS = {"impedance": IMPEDANCE, "all": (*IMPEDANCE, "magnet_flux_wb")}
 PARAMETERS = {"impedance": "impedance_factor", "all": "machine_factor"}
 
@@ -29,7 +32,7 @@ def _share(c) -> tuple[str, float]:
     return next(((form, share) for form, share in c.items() if share), ("impedance", 0.0))
 
 
-class MachineScale(Alternatives, FluxEffect, Constant, Restates):
+class MachineScale(Alternatives, FluxEffect, Constant, Chosen, Restates):
     rescales = KEYS["all"]
     one_of = (("impedance",), ("all",))
 
@@ -44,9 +47,9 @@ class MachineScale(Alternatives, FluxEffect, Constant, Restates):
             for form, psi in self.core_psi(view).items()
         }
 
-    def distances(self, parameters, nominal):
-        """Those of a sensor that leaves the same; at least at its limit: constants off alike are no tolerance."""
-        return [max(1.0, abs(1.0 / p.value - 1.0) / SENSOR) for p in parameters.values() if p.value != 1.0]
+    def log_choice(self, view):
+        """The odds of a sensor beyond its plausible range: three constants that are off alike are no tolerance."""
+        return float(np.log(k.IMPLAUSIBLE))
 
     def floor(self, nominal):
         return 0.004

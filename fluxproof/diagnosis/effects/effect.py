@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fluxproof.diagnosis.effects.columns import Column
-from fluxproof.diagnosis.effects.estimate import Parameter, beyond
+from fluxproof.diagnosis.effects.estimate import Parameter
 from fluxproof.diagnosis.ground.result import Estimate
 
 NEEDS = {
@@ -111,10 +111,6 @@ class Effect:
     def estimates(self, c: dict, covariance: np.ndarray, nominal) -> dict[str, Estimate]:
         """Parameters of the effect, {name: Estimate}, from its coefficients in the order of the covariance."""
         raise NotImplementedError
-
-    def distances(self, parameters: dict[str, Estimate], nominal) -> list[float]:
-        """How far each parameter lies outside of what is plausible, see ``beyond``; 0.0: within."""
-        return [beyond(parameters[key], limits, nominal) for key, limits in self.plausible.items() if key in parameters]
 
     def plant(self, c: dict, nominal) -> dict:
         """The effect as parameters of the plant, {"machine.resistance_ohm": 1.7, ...}."""

@@ -52,20 +52,6 @@ def is_usual(parameters: dict[str, Estimate], plausible: dict, nominal) -> bool:
     return all(believable(parameters[key], limits, nominal) for key, limits in plausible.items() if key in parameters)
 
 
-def beyond(estimate, limits, nominal) -> float:
-    """How far an estimate lies outside of what is plausible: 0.0 where it is believable, 1.0 at the limit.
-
-    The distance from the middle of the range in units of half the range: of the logarithms where a range is that of a
-    factor, so that a quarter is as far from a half as four is from two.
-    """
-    if believable(estimate, limits, nominal):
-        return 0.0
-    (low, high), value = plausible_range(limits, nominal), estimate.value
-    if low > 0.0:
-        low, high, value = np.log(low), np.log(high), np.log(max(value, 1e-3 * low))
-    return float(abs(value - 0.5 * (low + high)) / (0.5 * (high - low)))
-
-
 def believable(estimate, limits, nominal) -> bool:
     """Whether an estimate is within what its effect declares as plausible, or doubtfully beyond it."""
     low, high = plausible_range(limits, nominal)

@@ -7,8 +7,8 @@ What only limits effort (how many sets are tried), grids and tolerances of a num
 # ---- what a recording may contain
 # Prior probability that a given effect of the catalogue is present: of some twenty effects one is expected.
 PRESENT = 0.05
-# Odds of a parameter at the limit of what its effect declares as plausible, their square at twice the limit: absurd
-# errors that cancel may fit as well as the true ones.
+# Odds of a parameter outside of what its effect declares as plausible: absurd errors that cancel may fit as well as the
+# true ones.
 IMPLAUSIBLE = 1e-3
 # Exponent with which an effect below the smallest size of practical interest becomes improbable: no steep edge, beside
 # which a real error of a sensor would be replaced by larger ones that cancel; what is found and too small is a note.

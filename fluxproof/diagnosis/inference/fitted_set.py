@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fluxproof.diagnosis.effects import believable
 from fluxproof.diagnosis.ground import constants as k
 
 if TYPE_CHECKING:
@@ -75,18 +76,17 @@ def covariance_of(fit: FittedSet, name: str, full: np.ndarray) -> np.ndarray:
     return out
 
 
-def log_implausible(fit: FittedSet, name: str | None = None) -> float:
-    """Log prior of the parameters of a set, or of one effect of it, beyond what their effects declare as plausible.
-
-    The odds are ``IMPLAUSIBLE`` at the limit, their square at twice it: what no sensor does is no better than what none
-    does twice over.
-    """
-    return float(np.log(k.IMPLAUSIBLE) * sum(d for n in fit.names if name in (None, n) for d in _distances(fit, n)))
+def implausible(fit: FittedSet, name: str | None = None) -> int:
+    """Number of the parameters of a set, or of one effect of it, beyond what their effects declare as plausible."""
+    return sum(_implausible(fit, n) for n in fit.names if name in (None, n))
 
 
-def _distances(fit, name) -> list[float]:
+def _implausible(fit, name) -> int:
     effect, nominal = fit.problem.setup.effects[name], fit.problem.view.nominal
-    return effect.distances(effect.estimates(fit.c[name], covariance_of(fit, name, fit.cov), nominal), nominal)
+    if not effect.plausible:
+        return 0
+    found = effect.estimates(fit.c[name], covariance_of(fit, name, fit.cov), nominal)
+    return sum(not believable(found[key], limits, nominal) for key, limits in effect.plausible.items() if key in found)
 
 
 def log_too_small(fit: FittedSet, names) -> float:

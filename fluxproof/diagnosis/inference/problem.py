@@ -19,7 +19,7 @@ from fluxproof.diagnosis.effects.free_curve import alternatives
 from fluxproof.diagnosis.effects.search import log_choice
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
-from fluxproof.diagnosis.inference.fitted_set import FittedSet, log_implausible, log_too_small
+from fluxproof.diagnosis.inference.fitted_set import FittedSet, implausible, log_too_small
 from fluxproof.diagnosis.inference.linearise import Linearisation
 from fluxproof.diagnosis.inference.model import Columns
 from fluxproof.diagnosis.inference.points import condense
@@ -150,5 +150,5 @@ class Problem:
             for n, x in zip(names, a, strict=True)
         )
         found = FittedSet(self, names, float(value), take, c, cov, a, lam, mu)
-        judged = float(value) + log_implausible(found) + log_too_small(found, names)
+        judged = float(value) + np.log(k.IMPLAUSIBLE) * implausible(found) + log_too_small(found, names)
         return replace(found, value=judged)

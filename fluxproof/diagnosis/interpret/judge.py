@@ -26,7 +26,7 @@ from fluxproof.diagnosis.effects.constant import is_of_nameplate
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.machine import flux_terms
 from fluxproof.diagnosis.inference.evidence import evidence
-from fluxproof.diagnosis.inference.fitted_set import log_implausible
+from fluxproof.diagnosis.inference.fitted_set import implausible
 from fluxproof.diagnosis.inference.linearise import Rows
 from fluxproof.diagnosis.inference.model import no_columns
 from fluxproof.diagnosis.inference.points import condense
@@ -62,7 +62,7 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
     if len(np.unique(setup.points)) < k.READ_POINTS:
         return (), [], posterior
     most = len(posterior.best().names) if explained else np.inf
-    absurd = log_implausible(posterior.best()) < 0.0  # a bus sensor that is off by a third, say
+    absurd = implausible(posterior.best()) > 0  # a bus sensor that is off by a third, say
     able = [r for r in _all(setup.view.nominal) if r.possible(recordings)]
     able = [r for r in able if all(getattr(setup.view.machine, key) for key in r.machine)]
     terms = Terms(setup)
@@ -109,7 +109,7 @@ def _of_any_nameplate(fit) -> float:
     effects, value = fit.problem.setup.effects, fit.value
     for name, size in zip(fit.names, fit.sizes, strict=True):
         if is_of_nameplate(effects[name]):
-            value += np.log1p(size**2 / fit.problem.most[name]) - log_implausible(fit, name)
+            value += np.log1p(size**2 / fit.problem.most[name]) - np.log(k.IMPLAUSIBLE) * implausible(fit, name)
     return float(value)
 
 
