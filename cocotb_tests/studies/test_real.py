@@ -50,7 +50,9 @@ def test_emrax_names_what_its_log_can_show(emrax_entry):
     told = set(emrax_entry["effects"]).union(*emrax_entry["ambiguity"])
     assert {"dead_time", "encoder_offset", "cross_saturation"} <= set(emrax_entry["effects"])
     # A gain of the bus voltage leaves nearly what a magnet flux does; the flux is the likelier one of the two.
-    assert "magnet_flux" in told and {"inductance_q", "saturation"} & told and emrax_entry["sets"][0]["probability"] > 0.5
+    assert (
+        "magnet_flux" in told and {"inductance_q", "saturation"} & told and emrax_entry["sets"][0]["probability"] > 0.5
+    )
     assert all(entry.get("log_odds", -1.0) < 0.0 for entry in emrax_entry["if_added"].values())
     assert not {"resistance", "inductance_d", "iron_loss", "emf_harmonics"} & set(emrax_entry["effects"])
     assert len(emrax_entry["cannot_tell"]) > 4
