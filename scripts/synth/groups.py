@@ -97,15 +97,15 @@ def instances(vhdl: Path) -> dict[str, str]:
 
 
 def netlist_names(vhdl: Path) -> dict[str, str]:
-    """{label: name in the converted Verilog}: a generate block's label comes before those of its instances."""
-    names, scope = {}, ""
+    """{label: name in the converted Verilog}: the labels of the generate blocks around an instance come first."""
+    names, scopes = {}, []
     for line in _COMMENT.sub("", vhdl.read_text()).lower().splitlines():
         if begun := _GENERATE.match(line):
-            scope = f"{begun[1]}_"
+            scopes.append(f"{begun[1]}_")
         elif re.match(r"\s*end\s+generate", line):
-            scope = ""
+            scopes.pop()
         elif found := _INSTANCE.match(line):
-            names[found[1]] = scope + found[1]
+            names[found[1]] = "".join(scopes) + found[1]
     return names
 
 
