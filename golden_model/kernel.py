@@ -83,7 +83,8 @@ def kernel(function: Callable[P, R_co], cache_dir: Path = CACHE_DIR) -> Kernel[P
     SETTINGS.CACHE_DIR = str(cache_dir)
     try:
         # Nobody takes a kernel's address as that of a C function: compiling the wrapper for it would cost a tenth more.
-        compiled: Any = numba.njit(cache=True, no_cfunc_wrapper=True)(function)
+        options: Any = {"cache": True, "no_cfunc_wrapper": True}
+        compiled: Any = numba.njit(**options)(function)
         return compiled
     finally:
         SETTINGS.CACHE_DIR = previous
