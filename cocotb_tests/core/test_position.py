@@ -94,7 +94,7 @@ def test_moves_that_cannot_be_are_refused():
         positioned("servo_24v", speed_rad_s=400.0)
     with pytest.raises(DriveError, match="jerk_rad_s3"):
         registers(positioned("paper001", jerk_rad_s3=1.0))
-    assert not any(registers(drives.load(DRIVES / "paper001.toml")).values.k_inertia for _ in (0,))
+    assert not registers(drives.load(DRIVES / "paper001.toml")).values.k_inertia
     assert registers(positioned("paper001", stop_low_rad=-1.0, stop_high_rad=1.0)).values.stop_low < 0 < POSITION.hi
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import queue
 import shutil
 import socket
@@ -167,6 +168,17 @@ def test_what_brings_no_row_is_told(tmp_path, capsys):
         told = capsys.readouterr()
         assert words in told.err and source in told.err, told
         assert ("nobody answers" in told.out) == (source == nobody), told
+
+
+def test_a_pipe_loses_nothing_to_the_look_at_its_begin(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    writer = threading.Thread(target=pipe.write_bytes, args=(b"0123456789abcdef",))
+    writer.start()
+    source = source_of(str(pipe))
+    assert source.read() == b"0123456789abcdef"
+    writer.join()
+    source.close()
 
 
 def test_server_in_c(words, tmp_path):

@@ -53,8 +53,9 @@ class GrowingFile:
             self.file = open(path, "rb", buffering=0)  # noqa: SIM115 - closed by close()
         except OSError as error:
             raise DriveError(f"{path}: cannot be read: {error.strerror or error}") from None
-        begin = self.file.read(len(MAGIC)) or b""
-        if begin == MAGIC:
+        if not self.file.seekable():  # a pipe: what is read of it is gone
+            return
+        if self.file.read(len(MAGIC)) == MAGIC:
             self.file.close()
             raise DriveError(
                 f"{path}: this is a dump, a recording that has ended: diagnose it with 'fluxproof diagnose'; watch "
