@@ -23,7 +23,6 @@ from fluxproof.diagnosis.effects.drive_file import Restates
 from fluxproof.diagnosis.ground import constants as k
 
 TORQUE_PER_AMPERE = {("i",), ("magnet_flux_wb",)}  # what an effect rescales that changes it
-SURE = 3.0  # standard deviations
 
 
 @dataclass(frozen=True)
@@ -144,7 +143,7 @@ def _depends(name, fits) -> bool:
         for key in first.keys() & second.keys():
             a, b = first[key], second[key]
             apart = abs(a.value - b.value)
-            if apart > max(k.DEPENDS * max(abs(a.value), abs(b.value)), SURE * np.hypot(a.sigma, b.sigma)):
+            if apart > max(k.DEPENDS * max(abs(a.value), abs(b.value)), k.SURE * np.hypot(a.sigma, b.sigma)):
                 return True
     return False
 

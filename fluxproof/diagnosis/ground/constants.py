@@ -58,6 +58,12 @@ ONE_EFFECT = 7.0
 CLEARLY = 20.0
 # Least number of operating points: at fewer some convention meets any constant misfit.
 READ_POINTS = 3
+# Share of the voltage that R, L_d, L_q or psi_m must make to be seen beside the error of a real table.
+EXCITED = 0.01
+# Remainder, in usual errors, that no recording is exact enough for: a convention that leaves less has lost its rows.
+TOO_EXACT = 1e-6
+# Difference of two remainders, relative to one, below which two conventions leave the same.
+SAME_BALANCE = 1e-6
 
 # ---- what is reported
 # Largest probability of absence at which an effect, or one effect of an alternative, is still reported.
@@ -72,6 +78,8 @@ OPEN = 0.02
 TOGETHER = 0.5
 # Difference of an effect's parameter, relative to it, between alternatives that makes it a part of what is not known.
 DEPENDS = 0.2
+# The same in standard deviations, below which the alternatives agree.
+SURE = 3.0
 # Least probability at which an effect that is not reported still counts towards the explained share.
 LIKELY = 0.5
 # Discrepancy, in standard deviations of the balance's error, that is accepted without penalty.

@@ -36,9 +36,6 @@ from fluxproof.diagnosis.inference.setup import Setup
 
 WIDE = 6  # readings to which a second one is added
 SEARCHED = 2  # readings, or pairs of them, that are judged with the whole search
-NOTHING = 1e-6  # of the usual error: no recording is as exact, so that a reading that leaves less has lost its rows
-EXCITED = 0.01  # of the voltage: what a constant has to make of it to be seen beside the error of a real table
-SAME = 1e-6  # of the balance: readings that leave the same
 KEYS = ("resistance_ohm", "inductance_d_h", "inductance_q_h", "magnet_flux_wb")
 
 
@@ -72,7 +69,7 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
     plain = terms.judged(())
     free = max(map(_of_any_nameplate, posterior.fits.values())) + np.log(k.CLEARLY)
     good = sorted((j for j in map(terms.judged, ((r,) for r in able)) if j.value > plain.value), key=_rank)
-    good = [j for j in good if np.linalg.norm(j.y) > NOTHING * np.linalg.norm(terms.points(0.0)[0].level)]
+    good = [j for j in good if np.linalg.norm(j.y) > k.TOO_EXACT * np.linalg.norm(terms.points(0.0)[0].level)]
     two = [terms.judged((*j.readings, r)) for j in good[:WIDE] for r in able if _apart(j.readings, r)]
     singles = {j.readings[0].code: j.value for j in good}
     two = [j for j in two if j.value > max(singles.get(r.code, plain.value) for r in j.readings)]
@@ -169,7 +166,7 @@ def _apart(readings, more) -> bool:
 
 
 def _same(a, b) -> bool:
-    return bool(np.linalg.norm(a.y - b.y) <= SAME * np.linalg.norm(a.y) + 1e-12)
+    return bool(np.linalg.norm(a.y - b.y) <= k.SAME_BALANCE * np.linalg.norm(a.y) + 1e-12)
 
 
 def _without_doubles(ranked) -> list[Judged]:
@@ -231,7 +228,7 @@ class Terms:
         """How many of R, L_d, L_q and psi_m make a part of the voltage that can be told from nothing."""
         points, names = self.points(0.0)
         size = dict(zip(names, np.linalg.norm(points.x[self._is(points, "u")], axis=0), strict=True))
-        return sum(size[name] > EXCITED * size["u"] for name in ("r", "d", "q", "psi"))
+        return sum(size[name] > k.EXCITED * size["u"] for name in ("r", "d", "q", "psi"))
 
     def perfect(self) -> float:
         """The evidence of a balance that is met exactly: no set of effects reaches more."""
