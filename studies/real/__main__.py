@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
+import re
 import sys
 import time
 from collections.abc import Iterator
@@ -23,6 +24,7 @@ from fluxproof.fleet.engine import in_parallel
 from fluxproof.fleet.work import version
 from studies.real import brusa, emrax, laas
 from studies.real.truth import CASES
+from studies.real.variants import varied
 from studies.scored.study import print_counts, scored, write_page
 
 PARTS = {"brusa_flux_map": brusa, "emrax228": emrax, "laas_mn4004": laas}
@@ -79,6 +81,9 @@ def main(arguments=None) -> int:
         "--only", action="append", default=[], metavar="NAME", help=f"of {', '.join(PARTS)}, or a case of truth.py"
     )
     parser.add_argument("--jobs", type=int, default=2, help="diagnoses at once (default: 2)")
+    parser.add_argument(
+        "--varied", metavar="REGEX", help="only the variants of the recordings whose name matches (variants.py; .: all)"
+    )
     parser.add_argument("--again", action="store_true", help="judge the kept answers again, diagnose nothing")
     parser.add_argument("--out", type=Path, default=BUILD / "real")
     parser.add_argument("--quiet", action="store_true")
@@ -87,8 +92,12 @@ def main(arguments=None) -> int:
     unknown = sorted(set(chosen) - set(every))
     if unknown:
         parser.error(f"{unknown[0]} is not one of {', '.join(every)}")
-    result: dict = {"schema": 1, "recordings": studied([n for n in PARTS if not chosen or n in chosen], args)}
-    cases = [c for c in CASES if not chosen or c.name in chosen]
+    if args.varied:
+        result: dict = {"schema": 1}
+        cases = [c for c in varied() if re.search(args.varied, c.name)]
+    else:
+        result = {"schema": 1, "recordings": studied([n for n in PARTS if not chosen or n in chosen], args)}
+        cases = [c for c in CASES if not chosen or c.name in chosen]
     result |= scored(cases, args.out / "cases", args.jobs, whole=True, again=args.again)
     print_counts(result)
     write_page(result, args.out / "report.html", "Recordings of real drives and benches")

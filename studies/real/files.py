@@ -75,10 +75,10 @@ def brusa_loop(folder: Path):
     return out, write_text(folder / "drive.toml", brusa.DRIVE.read_text() + brusa.IDEAL)
 
 
-def written(table: pd.DataFrame, path: Path) -> Path:
+def written(table: pd.DataFrame, path: Path, separator: str = ",") -> Path:
     """A table as CSV with nine digits."""
     with replacing(path) as temporary:
-        table.to_csv(temporary, index=False, float_format="%.9g")
+        table.to_csv(temporary, index=False, float_format="%.9g", sep=separator)
     return path
 
 

@@ -25,6 +25,7 @@ from fluxproof.plant.transforms import space_vector
 
 MOST_ROWS = 5000
 FIT = 0.25  # misfit over voltage: any real effect is smaller at speed
+FITS, FEW = 0.1, 0.01  # misfit over voltage of a row that fits; share of the rows that may speak against a change
 BETTER = 0.3  # a change is accepted if the misfit falls below this share
 LEAST_ROWS, LEAST_OF_TABLE = 20, 6  # fewer fit by chance with some change
 LEAST_POINTS, SAME = 3, 0.1  # of dq values: operating points that are so far apart, of rated current and top speed
@@ -120,25 +121,35 @@ def misfit(rows: Rows, at_current: bool = False, at_d_current: bool = False) -> 
     at_current: use the rows with a large current instead, to check the current columns; at_d_current: of steady rows,
     those with a large d current.
     """
-    m = rows.machine
-    if isinstance(rows, SteadyRows):
-        i, omega = rows.dq.mean(axis=0), rows.omega.mean(axis=0)
-        rest: Complex = rows.u_dq - steady_voltage(m, i, omega)
-        left, u, at = rest, rows.u_dq, i
-        if np.isnan(u.real).any():
-            left, u = rest.imag, u.imag
-    else:
-        i_s = space_vector(rows.i)
-        turn = np.exp(1j * rows.theta)
-        i, at = i_s * np.conj(turn), i_s[0]
-        u = rows.u_dc * space_vector(rows.d)
-        left = u - m.resistance_ohm * i_s.mean(axis=0) - mean_emf(flux_linkage(m, i), turn, rows.period)
+    left, u, i, at = _left(rows)
     by = np.abs(at) if at_current else np.abs(i.real if at_d_current else u)
     large = by >= np.percentile(by, 75 if at_current or at_d_current else 50)
     if not large.any():  # a column without a value
         return np.inf
     size = float(np.median(np.abs(u[large])))
     return float(np.median(np.abs(left[large]))) / size if size > 0 else np.inf
+
+
+def contradicts(rows: Rows, changed: Rows) -> bool:
+    """Whether some rows fit as recorded and do not fit with a change, which a median over all rows hides."""
+    (left, u, *_), (left_changed, *_) = _left(rows), _left(changed)
+    size = float(np.median(np.abs(u)))
+    return bool(np.mean((np.abs(left) < FITS * size) & (np.abs(left_changed) > FIT * size)) > FEW)
+
+
+def _left(rows: Rows):
+    """(misfit, voltage) (m,) [V], real where only u_q is known, and currents (m,) in dq and as recorded [A]."""
+    m = rows.machine
+    if isinstance(rows, SteadyRows):
+        i, omega = rows.dq.mean(axis=0), rows.omega.mean(axis=0)
+        left: Complex = rows.u_dq - steady_voltage(m, i, omega)
+        q_only = bool(np.isnan(rows.u_dq.real).any())
+        return (left.imag, rows.u_dq.imag, i, i) if q_only else (left, rows.u_dq, i, i)
+    i_s = space_vector(rows.i)
+    turn = np.exp(1j * rows.theta)
+    i = i_s * np.conj(turn)
+    u = rows.u_dc * space_vector(rows.d)
+    return u - m.resistance_ohm * i_s.mean(axis=0) - mean_emf(flux_linkage(m, i), turn, rows.period), u, i, i_s[0]
 
 
 def discriminates(rows: Rows) -> bool:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
-from fluxproof.diagnosis.checks.balance import BETTER, FIT, Rows, SteadyRows, discriminates, misfit, rows_of
+from fluxproof.diagnosis.checks.balance import BETTER, FIT, Rows, SteadyRows, contradicts, discriminates, misfit, rows_of
 from fluxproof.diagnosis.checks.rival_readings import CLEAR, best_reading, misfit_of, turned_misfit
 from fluxproof.diagnosis.conventions.exchanges import CURRENTS, ORDERS, column_of, exchange, says
 from fluxproof.diagnosis.ground.arrays import Complex
@@ -44,7 +44,7 @@ def check(recording, nominal) -> None:
         tried = {name: max(misfit_of(changed, mode) for mode in modes) for name, changed in changes.items()}
         ranked = sorted(tried, key=tried.__getitem__)
         best = ranked[0]
-        if fits := tried[best] <= min(BETTER * left, FIT):
+        if fits := tried[best] <= min(BETTER * left, FIT) and not contradicts(rows, changes[best]):
             as_is = left
             break
     n = len(recording)

@@ -2,8 +2,9 @@
 """Currents whose unit is off by a prefix, of a size that no comparison with the nameplate tells: milliamps for amperes.
 
 A current that is a thousandth leaves its whole effect on the voltage, as other causes might.  It is a prefix if the
-nominal balance at large currents is not met as the file says and is met with the prefix.  The recording is refused,
-since the file states the one and the voltages need the other.
+nominal balance at large currents is not met as the file says and is met with the prefix, and worse without any current:
+a prefix that makes the currents vanish is confirmed by nothing.  The recording is refused, since the file states the
+one and the voltages need the other.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from fluxproof.diagnosis.conventions.units import PREFIXES
 from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "channels"
+VANISHING = 1e-12  # times the currents: none, and still the same rows with the largest ones
 NAMES = ("i_a", "i_b", "i_c", "i_d", "i_q")
 
 
@@ -25,7 +27,8 @@ def check(recording, nominal) -> None:
         return
     tried = {factor: misfit(_scaled(rows, factor), at_current=True) for factor in PREFIXES}
     best = min(tried, key=tried.__getitem__)
-    if tried[best] > min(BETTER * as_is, FIT):
+    without = misfit(_scaled(rows, VANISHING), at_current=True)
+    if tried[best] > min(BETTER * as_is, BETTER * without, FIT):
         return
     names = [name for name in NAMES if name in recording.columns and name in recording.meta.get("columns", {name: 0})]
     name, machine = names[0], nominal.machine

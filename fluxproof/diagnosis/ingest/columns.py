@@ -158,7 +158,8 @@ def _explicit(names, nominal, path) -> tuple[Plan, set[str]]:
         if "factor" in entry or "offset" in entry:
             source = Source(column, entry.get("factor", 1.0), entry.get("offset", 0.0), "", True)
         else:
-            source = _source(column, entry["name"], unit or _unit_of(column, names), nominal, where)
+            unit = unit or _unit_of(column, names) or _unit_in_name(column, entry["name"])
+            source = _source(column, entry["name"], unit, nominal, where)
         plan.sources[entry["name"]] = source
         plan.used = "[columns]"
     return plan, taken
@@ -179,6 +180,12 @@ def _source(column, name, unit, nominal, where) -> Source:
 def _unit_of(column, names) -> str:
     """The unit of a column in the file: from its header or from a field of the format."""
     return names.get(column, "").strip() or split_unit(column)[1]
+
+
+def _unit_in_name(column, canonical_name) -> str:
+    """The unit at the end of a usual name of this signal, such as "omega_e_rad_s"; "" where there is none."""
+    named = usual(column, "")
+    return named[1] if named and named[0] == canonical_name else ""
 
 
 def _exact(plan, left, nominal, path) -> None:

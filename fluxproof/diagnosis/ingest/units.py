@@ -78,11 +78,13 @@ FACTORS = {
     "rad/s": {
         "rad/s": 1.0,
         "rad.s": 1.0,
+        "rad_s": 1.0,
         "rad/sec": 1.0,
         "rad s-1": 1.0,
         "rad/s el": 1.0,
         "mrad/s": 1e-3,
         "deg/s": DEGREE,
+        "deg_s": DEGREE,
         "°/s": DEGREE,
         "Hz": TURN,
         "erpm": RPM,

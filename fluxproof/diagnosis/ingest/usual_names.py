@@ -93,11 +93,13 @@ def _of(name: str, unit: str) -> tuple[str, str, int] | None:
     if key in KNOWN:
         canonical, rank = KNOWN[key]
         return canonical, unit, rank
-    stem, _, ending = label.rpartition("_")
-    if not unit and stem and key not in TOLD:
-        key, unit = stem.lower(), ending
-        if key in KNOWN and conversion(KNOWN[key][0], unit, 1) is not None:
-            return KNOWN[key][0], unit, KNOWN[key][1]
+    parts = label.split("_")
+    if not unit and parts[0] and key not in TOLD:
+        for last in (2, 1):  # "rad_s" before "s"
+            stem, ending = "_".join(parts[:-last]).lower(), "_".join(parts[-last:])
+            if stem in KNOWN and conversion(KNOWN[stem][0], ending, 1) is not None:
+                return KNOWN[stem][0], ending, KNOWN[stem][1]
+        key, unit = stem, ending
     if key not in TOLD:
         return None
     canonical, rank = TOLD[key]
