@@ -11,6 +11,8 @@ from cocotb_tests.support.drives import L_D, L_Q, PSI, RATED
 from cocotb_tests.support.recordings.bench_logs import GRID, Truth, sampled, table
 from cocotb_tests.support.recordings.from_equations import made, nominal_of, write
 from fluxproof.diagnosis import diagnose
+from fluxproof.diagnosis.checks.balance import SteadyRows, contradicts
+from fluxproof.diagnosis.ground.machine import steady_voltage
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.words.phrases import CORRECTED
@@ -34,6 +36,23 @@ def test_a_sign_that_fits_at_large_currents_only_is_not_undone(tmp_path, nominal
     points += [(450.0, weak * x, 0.3 * RATED) for x in (1.0, 1.002, 1.004, 1.006, 1.008, 1.01)]
     columns = table(Truth(psi=0.9 * PSI), points=points)
     assert not corrected(load_recording(write(tmp_path / "r.csv", columns), nominal))
+
+
+@pytest.mark.parametrize("fit", [0, 1, 5])
+def test_rows_that_fit_as_recorded_speak_against_a_change(nominal, fit):
+    """Magnets that warm in field weakening turn the q voltage round: its sign fits most rows, and not the first ones."""
+    omega, i = np.full((2, 100), 450.0), np.full((2, 100), 0.5 + 1.0j)
+    u = steady_voltage(nominal.machine, i[0], omega[0])
+    rows = SteadyRows(nominal.machine, 1e-4, omega, omega, i, np.where(np.arange(100) < fit, u, np.conj(u)))
+    assert contradicts(rows, rows.change(u_dq=np.conj(rows.u_dq))) == (fit > 1)
+
+
+def test_currents_that_a_wrong_nameplate_hides_are_in_amperes(tmp_path, nominal):
+    """Stronger magnets and a larger L_d cancel at the largest current: no prefix is seen where no current is."""
+    stronger = Truth(psi=1.86 * PSI, l_d=0.86 * PSI / 5.0)
+    points = [(w, i_d, 0.0) for w in (200.0, 300.0, 400.0, 500.0) for i_d in (0.0, -2.0, -3.5, -5.0)]
+    recording = load_recording(write(tmp_path / "r.csv", table(stronger, points=points)), nominal)
+    assert not [p for p in recording.problems if p.fatal]
 
 
 def test_an_angle_that_is_off_at_one_point_is_no_order_of_phases(tmp_path, nominal):

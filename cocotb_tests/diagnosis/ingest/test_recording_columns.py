@@ -81,6 +81,15 @@ def test_an_option_names_a_column(tmp_path):
             entries_of([text])
 
 
+def test_a_mapped_column_has_the_unit_in_its_name(tmp_path):
+    nominal = nominal_of(tmp_path, 'omega_e_rad_s = "omega_e"\nia_mA = "i_a"')
+    table = made(500)
+    raw = {{"omega_e": "omega_e_rad_s", "i_a": "ia_mA"}.get(name, name): values for name, values in table.items()}
+    recording = load_recording(write(tmp_path / "r.csv", raw | {"ia_mA": 1e3 * table["i_a"]}), nominal)
+    assert {"omega_e", "i_a"} <= set(recording.meta["stated_units"])
+    np.testing.assert_allclose(recording["i_a"], table["i_a"], rtol=1e-9, atol=1e-9)
+
+
 def test_files_of_several_loggers_share_the_columns(tmp_path):
     nominal = nominal_of(tmp_path, '"I U [mA]" = "i_a"\n"Motor current U" = "i_a"')
     table = made(500)

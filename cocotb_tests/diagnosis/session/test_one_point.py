@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from cocotb_tests.support.diagnoses.answers import answer_of, found, said, without
@@ -53,6 +54,19 @@ def test_a_constant_misfit_at_one_point_is_an_ambiguity(tmp_path):
     two_rows = answer_of(tmp_path, table(WEAK, points=[(300.0, 0.0, 4.0)] * 2))
     assert two_rows.fit.train_before > 2.0 > two_rows.fit.train_after
     assert two_rows.verdict == "ambiguous" and "magnet_flux" in two_rows.ambiguity[0]
+
+
+def test_the_only_cause_of_a_constant_misfit_is_told_and_not_asserted(tmp_path):
+    """An angle that is 0.43 rad ahead: nothing else of a usual size leaves as little; one point does not prove it."""
+    columns = warming(magnets=0.0, copper=0.0)
+    i, u = (columns[f"{x}_d{r}"] + 1j * columns[f"{x}_q{r}"] for x, r in (("i", ""), ("u", "_ref")))
+    for x, ref, values in (("i", "", i * np.exp(-0.43j)), ("u", "_ref", u * np.exp(-0.43j))):
+        columns |= {f"{x}_d{ref}": values.real, f"{x}_q{ref}": values.imag}
+    answer = answer_of(tmp_path, columns)
+    assert answer.verdict == "unexplained" and [e.name for e in answer.best_fit.effects] == ["encoder_offset"]
+    assert answer.best_fit.effects[0].parameters["offset_rad"].value == pytest.approx(0.43, abs=0.02)
+    assert "one operating point cannot confirm it" in answer.sentence and answer.best_fit.probability > 0.5
+    assert len(answer.next_recording) == 3
 
 
 def test_a_constant_misfit_that_nothing_explains_is_the_remainder(tmp_path):

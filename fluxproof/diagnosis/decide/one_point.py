@@ -24,7 +24,7 @@ from fluxproof.diagnosis.decide.sized import has_size
 from fluxproof.diagnosis.decide.verdict import kind_of_one_point
 from fluxproof.diagnosis.effects.course import moved
 from fluxproof.diagnosis.ground import constants as k
-from fluxproof.diagnosis.ground.result import Estimate, Fit, NamedEffect, Remainder
+from fluxproof.diagnosis.ground.result import BestFit, Estimate, Fit, NamedEffect, Remainder
 from fluxproof.diagnosis.inference.drift_fit import (
     best_sets,
     centred_cells,
@@ -63,6 +63,7 @@ def conclude_one_point(view) -> Decision:
         effects=tuple(named[n] for n in names),
         ambiguity=groups,
         alternatives=tuple(e for e in alone if any(e.name in g for g in groups)),
+        best_fit=_only_one(alone, view, point, fit, len(effects)) if kind == "unexplained" else None,
         withheld=(
             *(Withheld(n, CONSTANT) for n in beside),
             *(Withheld(n, SIZELESS) for n in drifted if n not in sized),
@@ -94,6 +95,19 @@ def _ruled(found, best, drift: Fit, point: OnePoint, view):
     if kind == "unexplained":  # nothing is named, so that the whole misfit is left
         fit = replace(fit, train_after=fit.train_before, holdout_after=fit.holdout_before)
     return names, groups, beside, kind, fit
+
+
+def _only_one(alone, view, point: OnePoint, fit: Fit, tried: int) -> BestFit | None:
+    """The only effect that explains a constant misfit, which one point does not confirm; None if several do or none.
+
+    Its probability is that against columns of any direction, of which each leaves as little by chance.
+    """
+    if len(alone) != 1:
+        return None
+    near = min(k.FITS * resolution(view) / abs(point.constant), 1.0)  # sine of the angle between column and misfit
+    by_chance = tried * 2.0 * float(np.arcsin(near)) / np.pi
+    left = float(np.hypot(fit.noise_floor, abs(point.constant) * (1.0 - alone[0].explains) ** 0.5))
+    return BestFit(alone, 1.0 / (1.0 + by_chance), left, "one operating point cannot confirm it")
 
 
 def _is_unclear(names, left_over, drift: Fit) -> bool:

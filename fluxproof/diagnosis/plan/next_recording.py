@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The next recording that a decision asks for: none without an ambiguity."""
+"""The next recording that a decision asks for: none without an ambiguity or a cause that one point cannot confirm."""
 
 from __future__ import annotations
 
@@ -15,10 +15,12 @@ from fluxproof.diagnosis.plan.request import requests, wants_cold
 def next_recording(decision: Decision, progress=lambda text: None) -> tuple[Planned, ...]:
     """The operating points that separate the ambiguities of a decision."""
     basis = decision.basis
+    if basis is not None and basis.posterior is None:
+        best = decision.best_fit
+        likely = (tuple(e.name for e in best.effects),) if best is not None else ()
+        return points_beside(basis.view, decision.ambiguity or likely)
     if basis is None or not decision.ambiguity:
         return ()
-    if basis.posterior is None:
-        return points_beside(basis.view, decision.ambiguity)
     progress("choosing the next recording")
     setup = basis.posterior.setup
     if not basis.view.has_voltage.any():  # a point is planned by the voltage that it would show
