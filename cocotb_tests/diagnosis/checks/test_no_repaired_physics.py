@@ -40,7 +40,7 @@ def test_a_sign_that_fits_at_large_currents_only_is_not_undone(tmp_path, nominal
 
 @pytest.mark.parametrize("fit", [0, 1, 5])
 def test_rows_that_fit_as_recorded_speak_against_a_change(nominal, fit):
-    """Magnets that warm in field weakening turn the q voltage round: its sign fits most rows, and not the first ones."""
+    """Magnets that warm in field weakening turn the q voltage round: its sign fits all but the first rows."""
     omega, i = np.full((2, 100), 450.0), np.full((2, 100), 0.5 + 1.0j)
     u = steady_voltage(nominal.machine, i[0], omega[0])
     rows = SteadyRows(nominal.machine, 1e-4, omega, omega, i, np.where(np.arange(100) < fit, u, np.conj(u)))
