@@ -107,4 +107,4 @@ def varied() -> list[Case]:
     cases = {case.name: case for case in CASES}
     parts = (first_part, last_part)
     made = [_varied(cases[n], c) for n in CUT for c in TABLE_VARIANTS if not (n in WHOLE and c in parts)]
-    return made + [_nameplate(cases[n], key, f) for n in SIZED for key in KEYS for f in (0.8, 1.25)]
+    return made + [_nameplate(cases[n], key, f) for n in SIZED for key in KEYS for f in (0.7, 1.5)]
