@@ -90,7 +90,7 @@ SPINDLE = Truth(
 )
 FLIPSKY = Truth(
     (Cause(("inductance_d", "saturation"), {"inductance_d_h": (20e-6, 31e-6)}),),
-    (Cause(("magnet_flux",), {"magnet_flux_wb": (0.0044, 0.0048)}), Cause(("saturation",))),
+    (Cause(("magnet_flux",), {"magnet_flux_wb": (0.0044, 0.0050)}), Cause(("saturation",))),
     text="L_d +118 %, falling with current",
 )
 ONE_ANGLE = Truth(
