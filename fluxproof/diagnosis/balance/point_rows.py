@@ -11,16 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.balance.blocks import view_of
-from fluxproof.diagnosis.balance.slow_stretches import (
-    AT_REST,
-    STANDING,
-    STILL,
-    Stretches,
-    known_angle,
-    known_voltage,
-    operating_columns,
-    torque_at_shaft,
-)
+from fluxproof.diagnosis.balance.slow_columns import known_angle, known_voltage, operating_columns, torque_at_shaft
+from fluxproof.diagnosis.balance.slow_stretches import AT_REST, STANDING, STILL, Stretches
 from fluxproof.diagnosis.ground.machine import steady_voltage
 from fluxproof.diagnosis.ground.nominal import flux_level
 from fluxproof.diagnosis.ground.recording import RecordingError

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Steady stretches of a slow log, for which a voltage balance can be made although samples are far apart.
 
-A slow log, such as that of a CAN bus, holds every value until the next message or interpolates between two messages.
-The messages are not synchronous, so that a row combines values of different instants.  This is harmless in a steady
-state: over two messages of the slowest signal, nominal and recorded voltage are constant within a small share of the
-largest voltage, every signal that is not at rest has been updated, and the rotor turns.  Changes shortly before and
-after a stretch bound the error due to values of different age: ``unsteady``.
+The messages of a slow log (messages.py) are not synchronous, so that a row combines values of different instants.  This
+is harmless in a steady state: over two messages of the slowest signal, nominal and recorded voltage are constant within
+a small share of the largest voltage, every signal that is not at rest has been updated, and the rotor turns.  Changes
+shortly before and after a stretch bound the error due to values of different age: ``unsteady``.
 
 A rotor at rest is steady too, if its angle is known: the inverter loss depends on it.
 
@@ -18,12 +17,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fluxproof.diagnosis.balance.messages import message_period, restless, updates
 from fluxproof.diagnosis.balance.moving_stretches import moving_log, moving_stretches
-from fluxproof.diagnosis.balance.shaft import airgap, is_airgap
+from fluxproof.diagnosis.balance.slow_columns import known_angle, known_voltage, operating_columns, torque_at_shaft
 from fluxproof.diagnosis.ground.arrays import Complex
 from fluxproof.diagnosis.ground.machine import steady_voltage
 from fluxproof.diagnosis.ground.recording import Recording, RecordingError
-from fluxproof.plant.transforms import space_vector
 
 SIGNALS = ("i_d", "i_q", "u_d", "u_q", "omega")
 STILL = 0.015  # of the largest voltage: largest change of nominal and recorded voltage
@@ -31,18 +30,12 @@ LEAST_S = (0.5, 0.2, 0.1, 0.05)  # the shorter ones only if the longer ones find
 ENOUGH = 8  # operating points
 MESSAGES = 2.0  # number of messages of the slowest signal in a stretch
 AROUND, LOOSE = 0.5, 8.0  # margin before and after a window, as a share of it; factor of the change allowed there
-REST = 1e-3  # of a signal's largest value: a smaller signal is at rest and needs no update
 FEW_TURNS = 1.5  # the same in a log without messages, whose stretches are shorter
 TURNS = 4.0  # electrical turns within a stretch: the inverter loss depends on the angle, its mean over turns does not
-RESTED = 6.0  # times the median time between changes: after a longer time the signal counts as constant
-EVERY_ROW = 0.75  # of the rows: between every one, and every second one, which a held or interpolated signal changes in
-USUAL = 0.9  # quantile of the other intervals
 CONTROL = 2e-3  # s: a control samples as often
-GAP = 10.0  # times the usual step
 MESSAGE_ROWS = 3.0  # rows; a signal that changes as often has no messages
 PARTS = 4  # of a stretch without messages
 NOISE = 3.0  # standard deviations: usual range of PARTS means
-COMPUTED = 5e-4  # of the torque: what a measured one differs from the formula at least
 SELDOM = 0.4  # share of the rows in steady stretches of a log that is seldom steady
 AT_REST = 0.05  # rad within a stretch: the rotor does not turn
 
@@ -160,11 +153,7 @@ def stretches_of(recording, nominal, least_s) -> Stretches:
     t = r["t"] - r["t"][0]
     parts = dict(zip(SIGNALS, (i.real, i.imag, u.real, u.imag, omega), strict=True))
     periods = {name: message_period(t, x) for name, x in parts.items()}
-    fresh = [
-        np.cumsum(np.append(False, np.diff(x) != 0) | (np.abs(x) < REST * np.nanmax(np.abs(x))))
-        for x in parts.values()
-        if restless(t, x)
-    ]
+    fresh = [updates(x) for x in parts.values() if restless(t, x)]
     window = max(least_s, MESSAGES * max(periods.values()))
     change, turns = _change, TURNS
     if max(periods.values()) < MESSAGE_ROWS * np.median(np.diff(t)):  # no messages: every row has its own noise
@@ -235,20 +224,6 @@ def _unmet(omega, angle, window, turns) -> str:
 STANDING = "; at standstill record theta_e, or add it to [constants]: the inverter loss depends on the angle"
 
 
-def known_voltage(u, nominal_u):
-    """(voltage (n,) complex [V], whether u_d is known); an unknown u_d is set to the nominal one and not used."""
-    if np.isfinite(u.real).any():
-        return u, True
-    return nominal_u.real + 1j * u.imag, False
-
-
-def known_angle(recording) -> np.ndarray:
-    """(n,) recorded angle [rad], nan if it was integrated from the speed or is missing."""
-    if not recording.has("theta_e") or recording.meta.get("angle") == "integrated":
-        return np.full(len(recording), np.nan)
-    return recording["theta_e"]
-
-
 def _change(x) -> float:
     return float(max(np.ptp(x.real), np.ptp(x.imag)))
 
@@ -261,79 +236,3 @@ def _drift(x) -> float:
     means = np.array([p.mean() for p in np.array_split(x, parts)])
     noise = np.sqrt(np.mean(np.abs(np.diff(x)) ** 2) / 2.0 * parts / len(x))
     return max(_change(means) - NOISE * float(noise), 0.0)
-
-
-def torque_at_shaft(recording, nominal, i, omega) -> np.ndarray:
-    """(n,) measured torque of a steady drive [Nm], less the drag if the air-gap torque was recorded.
-
-    nan without one, and of one that a drive computed from the currents: no transducer agrees with a formula as closely.
-    """
-    if not recording.has("torque"):
-        return np.full(len(recording), np.nan)
-    torque, nominal_airgap = recording["torque"], airgap(nominal, i)
-    if np.nanmedian(np.abs(torque - nominal_airgap)) <= COMPUTED * np.nanmedian(np.abs(torque)):
-        return np.full(len(recording), np.nan)
-    drag = (nominal.machine.viscous_friction_nms or 0.0) * omega / nominal.machine.pole_pairs
-    return torque - drag if is_airgap(torque, nominal_airgap, drag) else torque
-
-
-def operating_columns(recording: Recording, nominal):
-    """(i, u, omega, u_dc): dq current [A] and voltage [V] complex, speed [rad/s], bus [V], all (n,)."""
-    r = recording
-    if not r.has("omega_e"):
-        raise RecordingError(f"{r.source}: a slow recording needs the speed omega_e: its angle is sampled too rarely")
-    omega = r["omega_e"]
-    u_dc = r["u_dc"] if r.has("u_dc") else np.full(len(r), float(nominal.inverter.dc_bus_v))
-    if r.has("i_d", "i_q"):
-        i = r["i_d"] + 1j * r["i_q"]
-    elif r.has("i_a", "i_b", "theta_e"):
-        third = r["i_c"] if r.has("i_c") else -r["i_a"] - r["i_b"]
-        i = space_vector(np.stack([r["i_a"], r["i_b"], third], axis=1)) * np.exp(-1j * r["theta_e"])
-    else:
-        raise RecordingError(f"{r.source}: i_d, i_q or i_a, i_b with theta_e are needed")
-    if r.has("u_q_ref") and not r.has("d_a", "d_b", "d_c", "theta_e"):
-        u_d = r["u_d_ref"] if r.has("u_d_ref") else np.full(len(r), np.nan)
-        return i, u_d + 1j * r["u_q_ref"], omega, u_dc
-    if r.has("u_d_ref", "u_q_ref"):
-        return i, r["u_d_ref"] + 1j * r["u_q_ref"], omega, u_dc
-    if not r.has("d_a", "d_b", "d_c", "theta_e"):
-        raise RecordingError(f"{r.source}: u_d_ref, u_q_ref or d_a, d_b, d_c with theta_e are needed")
-    ahead = (nominal.control.duty_applied_after_samples + 0.5) * nominal.sample_time_s * omega
-    duties = np.stack([r["d_a"], r["d_b"], r["d_c"]], axis=1)
-    return i, space_vector(duties) * u_dc * np.exp(-1j * (r["theta_e"] + ahead)), omega, u_dc
-
-
-def message_period(t, x) -> float:
-    """Typical longest time between two messages of a signal [s], from its changes; interpolation counts once.
-
-    Of a signal that changes in nearly every row, each row is a message: its few longer intervals are rests.
-    """
-    apart = _between_changes(t, x) if np.isfinite(x).any() and not _is_in_every_row(x) else ()
-    if len(apart) < 4:
-        return float(np.median(np.diff(t)))
-    return float(np.quantile(apart[apart < RESTED * np.median(apart)], USUAL))
-
-
-def _is_in_every_row(x) -> bool:
-    """Whether a signal, where it is not at rest, neither holds a value nor is interpolated over two rows or more."""
-    largest = np.nanmax(np.abs(x))
-    active = np.abs(x) > REST * largest
-    moves, bends = (np.abs(np.diff(x, n)) > 1e-9 * largest for n in (1, 2))
-    return bool(active[2:].any() and min(moves[active[1:]].mean(), bends[active[2:]].mean()) > EVERY_ROW)
-
-
-def restless(t, x) -> bool:
-    """Whether a signal changes with nearly every message unless at rest, so that no change means no message."""
-    if not np.isfinite(x).any():  # not recorded
-        return False
-    apart, period = _between_changes(t, x), message_period(t, x)
-    active = np.abs(x) > REST * np.nanmax(np.abs(x))
-    return float(apart[apart < 3.0 * period].sum()) > 0.5 * active.mean() * (t[-1] - t[0])
-
-
-def _between_changes(t, x) -> np.ndarray:
-    bends = np.flatnonzero(np.abs(np.diff(x, 2)) > 1e-9 * max(np.nanmax(np.abs(x)), 1e-30)) + 1
-    step = np.median(np.diff(t))
-    over = np.append(0, np.cumsum(np.diff(t) > GAP * step))
-    apart = np.diff(t[bends])[np.diff(over[bends]) == 0]  # rows that were not recorded are no wait for a message
-    return apart[apart > 1.5 * step]

@@ -13,7 +13,16 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.diagnosis.checks.agreement import angle_speed_ratio
-from fluxproof.diagnosis.checks.balance import BETTER, FIT, Rows, SteadyRows, contradicts, discriminates, misfit, rows_of
+from fluxproof.diagnosis.checks.balance import (
+    BETTER,
+    FIT,
+    Rows,
+    SteadyRows,
+    contradicts,
+    discriminates,
+    misfit,
+    rows_of,
+)
 from fluxproof.diagnosis.checks.rival_readings import CLEAR, best_reading, misfit_of, turned_misfit
 from fluxproof.diagnosis.conventions.exchanges import CURRENTS, ORDERS, column_of, exchange, says
 from fluxproof.diagnosis.ground.arrays import Complex
