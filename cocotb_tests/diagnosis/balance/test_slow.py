@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.recordings.slow_logs import LEVELS, NOMINAL, Truth, log
-from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.balance.messages import message_period
+from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.balance.slow_stretches import Stretches, stretches, stretches_in_motion
 from fluxproof.diagnosis.balance.slow_view import alike, slow_view
 from fluxproof.diagnosis.catalogue import CATALOGUE
