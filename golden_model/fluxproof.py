@@ -184,6 +184,29 @@ SAMPLE_INTERVAL = max(last for _, last in schedule().values()) + 1  # no sample 
 REGISTERS = {p.name: p for module in MODULES for p in module.BLOCK.registers}
 Registers = namedtuple("Registers", list(REGISTERS))
 
+# Generic -> the instances that only a core with it has, the narrowest part first
+PARTS = {
+    "references": ("references", "table_current"),
+    "position_loop": ("position_regulator", "trajectory", "towards"),
+    "residual": ("residual",),
+}
+PARTS["estimators"] = (
+    *("resistance", "merged_flux", "leg_compensation", "compensation_dq", "direction_functions", "period_voltage"),
+    *("motor_voltage", "towards", "directions", "magnetic_model", "model_flux", "merge", "speed_inverse", "flux_error"),
+    *("compensation", "torque_estimate", "monitor", "inverter_loss", "magnet_flux", "residual"),
+)
+
+
+def part_of(register: str) -> str:
+    """The generic without which no instance reads this register; empty where every core has one that does."""
+    readers = {name for name, (module, _) in WIRING.items() if register in {p.name for p in module.BLOCK.registers}}
+    if any(register in {p.name for p in module.BLOCK.registers} for module in AT_THE_CLOCK):
+        return ""
+    return next((generic for generic, part in PARTS.items() if readers <= set(part)), "")
+
+
+NEEDS = {name: part_of(name) for name in REGISTERS}
+
 
 class Config(NamedTuple):
     """The generics of the top entity."""

@@ -13,7 +13,7 @@ import numpy as np
 from golden_model.control.torque_reference import BLANK
 from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError
-from golden_model.fluxproof import REGISTERS, Config, Registers
+from golden_model.fluxproof import NEEDS, REGISTERS, Config, Registers
 from golden_model.scaling import PARTS, ROUND_UP, gates
 from golden_model.table_scaling import references, table_of
 from golden_model.units import TURN_RAD
@@ -49,9 +49,10 @@ def registers(drive: Drive, flux=None) -> RegisterSet:
     """
     table = table_of(drive, flux) if drive.core.references else None
     entries = {e.name: e for part in PARTS for e in part(drive)} | {e.name: e for e in references(drive, table)}
-    rows = {name: _row(entries[name], port) for name, port in REGISTERS.items()}
-    _keep_pulse_above_dead_time(rows, drive)
     core = drive.core
+    built = {name for name, generic in NEEDS.items() if not generic or getattr(core, generic)}
+    rows = {name: (_row if name in built else _left_out)(entries[name], port) for name, port in REGISTERS.items()}
+    _keep_pulse_above_dead_time(rows, drive)
     generics = (
         drive.carrier_half,
         int(core.estimators),
@@ -89,6 +90,12 @@ def _row(entry, port):
             f"allowed is 0 or at least {least:.6g} {entry.unit}"
         )
     return _printed(entry, port, integer)
+
+
+def _left_out(entry, port):
+    """The reset value, which is all that the register of a part that is not built can hold."""
+    reset = max(port.low, min(port.high, 0))
+    return _printed(entry._replace(si=reset * port.fmt.lsb * entry.scale), port, reset)
 
 
 def _printed(entry, port, integer):

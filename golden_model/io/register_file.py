@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The registers behind the bus, one transaction at a time: twin of generated/register_file.vhd and register_access.vhd.
 
-A write takes effect or is refused as a whole; the response says which (OKAY, SLVERR, DECERR of AXI4).  The RTL decides
-when it takes effect (see register_map.Kind); the caller reports samples to this model by ``sample()``.
+A write takes effect or is refused as a whole; the response says which (OKAY, SLVERR, DECERR of AXI4).  A register of a
+part that the core was built without keeps its reset value: a legal write is OKAY and changes nothing.  The RTL decides
+when a write takes effect (see register_map.Kind); the caller reports samples to this model by ``sample()``.
 Formats: words are 32 bits as software sees them, unsigned; ``values`` holds the integers.
 """
 
@@ -67,7 +68,8 @@ class RegisterFile:
         value = from_word(word)
         if not register.port.low <= value <= register.port.high:
             return SLVERR
-        self.values[register.name] = value
+        if not register.needs or self._constant[register.needs]:
+            self.values[register.name] = value
         return OKAY
 
     def read(self, address: int) -> tuple[int, int]:

@@ -84,7 +84,10 @@ class Field:
 
 @dataclass(frozen=True)
 class Register:
-    """One word of the map; ``reset`` is its value after a reset (of a constant: always)."""
+    """One word of the map; ``reset`` is its value after a reset (of a constant: always).
+
+    ``needs``: the generic without which nothing reads the register: it then keeps its reset value, whatever is written.
+    """
 
     name: str
     address: int
@@ -92,6 +95,7 @@ class Register:
     fields: tuple[Field, ...]
     doc: str
     reset: int = 0
+    needs: str = ""
 
     @property
     def port(self) -> Port:
@@ -275,8 +279,11 @@ def _writable(settings: Mapping[str, Port]) -> list[Register]:
             raise ValueError(f"register map: {', '.join(unknown)} has an address, but is not a port of the core")
     found = [(name, address, kind, given[name]) for name, (address, kind) in _COMMANDS.items()]
     found += [(name, SETTINGS[name], Kind.SETTING, port) for name, port in settings.items()]
+    needs = fluxproof.NEEDS
     return [
-        Register(name, address, kind, (Field(name, port),), port.doc, max(port.low, min(port.high, 0)))
+        Register(
+            name, address, kind, (Field(name, port),), port.doc, max(port.low, min(port.high, 0)), needs.get(name, "")
+        )
         for name, address, kind, port in found
     ]
 

@@ -8,6 +8,7 @@
 --
 -- sample_busy must be high from the clock after a sample was accepted until it has left the pipeline: no output that a
 -- sample uses changes at an edge with sample_busy = '1'.
+-- A register of a part that a generic leaves out is no flip-flop: it keeps its reset value, whatever is written.
 -- Refused writes change nothing, a read without a register gives zero; rules and responses: register_access.vhd.
 -- Formats: those of the core's ports.  Latency: 6 clocks from request to response, more while a write waits for the
 -- end of a sample.  Rounding: none.
@@ -416,35 +417,35 @@ begin
         settings.r_s <= unsigned(held(23 downto 0));
         written(97)  <= '1';
       end if;
-      if (row(12) and column(2) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(12) and column(2) and not sample_busy) = '1' then
         settings.t_s <= unsigned(held(16 downto 0));
         written(98)  <= '1';
       end if;
-      if (row(12) and column(3) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(12) and column(3) and not sample_busy) = '1' then
         settings.omega_0 <= unsigned(held(15 downto 0));
         written(99)      <= '1';
       end if;
-      if (row(12) and column(4) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(12) and column(4) and not sample_busy) = '1' then
         settings.xi  <= unsigned(held(15 downto 0));
         written(100) <= '1';
       end if;
-      if (row(12) and column(5) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(12) and column(5) and not sample_busy) = '1' then
         settings.omega_min <= unsigned(held(16 downto 0));
         written(101)       <= '1';
       end if;
-      if (row(12) and column(6) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(12) and column(6) and not sample_busy) = '1' then
         settings.k_ramp <= unsigned(held(15 downto 0));
         written(102)    <= '1';
       end if;
-      if (row(12) and column(7) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(12) and column(7) and not sample_busy) = '1' then
         settings.flux_kp <= unsigned(held(16 downto 0));
         written(103)     <= '1';
       end if;
-      if (row(13) and column(0) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(13) and column(0) and not sample_busy) = '1' then
         settings.flux_ki <= unsigned(held(16 downto 0));
         written(104)     <= '1';
       end if;
-      if (row(13) and column(1) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(13) and column(1) and not sample_busy) = '1' then
         settings.delta_max <= unsigned(held(15 downto 0));
         written(105)       <= '1';
       end if;
@@ -452,67 +453,67 @@ begin
         settings.k_chord <= unsigned(held(16 downto 0));
         written(106)     <= '1';
       end if;
-      if (row(13) and column(4) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(13) and column(4) and not sample_busy) = '1' then
         settings.tcr <= unsigned(held(23 downto 0));
         written(108) <= '1';
       end if;
-      if (row(13) and column(5) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(13) and column(5) and not sample_busy) = '1' then
         settings.t_0 <= signed(held(15 downto 0));
         written(109) <= '1';
       end if;
-      if (row(13) and column(6) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(13) and column(6) and not sample_busy) = '1' then
         settings.t_min <= signed(held(15 downto 0));
         written(110)   <= '1';
       end if;
-      if (row(13) and column(7) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(13) and column(7) and not sample_busy) = '1' then
         settings.t_max <= signed(held(15 downto 0));
         written(111)   <= '1';
       end if;
-      if (row(14) and column(0) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(14) and column(0) and not sample_busy) = '1' then
         settings.compensate <= held(0);
         written(112)        <= '1';
       end if;
-      if (row(14) and column(1) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(14) and column(1) and not sample_busy) = '1' then
         settings.k_lp <= unsigned(held(19 downto 0));
         written(113)  <= '1';
       end if;
-      if (row(14) and column(2) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(14) and column(2) and not sample_busy) = '1' then
         settings.eta_v <= unsigned(held(20 downto 0));
         written(114)   <= '1';
       end if;
-      if (row(14) and column(3) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(14) and column(3) and not sample_busy) = '1' then
         settings.gamma <= unsigned(held(16 downto 0));
         written(115)   <= '1';
       end if;
-      if (row(14) and column(4) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(14) and column(4) and not sample_busy) = '1' then
         settings.zeta <= unsigned(held(16 downto 0));
         written(116)  <= '1';
       end if;
-      if (row(14) and column(5) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(14) and column(5) and not sample_busy) = '1' then
         settings.v_thr <= unsigned(held(16 downto 0));
         written(117)   <= '1';
       end if;
-      if (row(14) and column(6) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(14) and column(6) and not sample_busy) = '1' then
         settings.v_comp_max <= unsigned(held(16 downto 0));
         written(118)        <= '1';
       end if;
-      if (row(14) and column(7) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(14) and column(7) and not sample_busy) = '1' then
         settings.i_learn <= unsigned(held(16 downto 0));
         written(119)     <= '1';
       end if;
-      if (row(15) and column(0) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(15) and column(0) and not sample_busy) = '1' then
         settings.eta_psi <= unsigned(held(16 downto 0));
         written(120)     <= '1';
       end if;
-      if (row(15) and column(1) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(15) and column(1) and not sample_busy) = '1' then
         settings.omega_psi_min <= unsigned(held(16 downto 0));
         written(121)           <= '1';
       end if;
-      if (row(15) and column(2) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(15) and column(2) and not sample_busy) = '1' then
         settings.k_ahead <= unsigned(held(16 downto 0));
         written(122)     <= '1';
       end if;
-      if (row(15) and column(3) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(15) and column(3) and not sample_busy) = '1' then
         settings.k_sign <= unsigned(held(23 downto 0));
         written(123)    <= '1';
       end if;
@@ -608,139 +609,139 @@ begin
         settings.charge_samples <= unsigned(held(9 downto 0));
         written(146)            <= '1';
       end if;
-      if (row(18) and column(4) and not sample_busy) = '1' then
+      if REFERENCES = 1 and (row(18) and column(4) and not sample_busy) = '1' then
         settings.use_table <= held(0);
         written(148)       <= '1';
       end if;
-      if (row(18) and column(5) and not sample_busy) = '1' then
+      if REFERENCES = 1 and (row(18) and column(5) and not sample_busy) = '1' then
         settings.k_flux <= unsigned(held(23 downto 0));
         written(149)    <= '1';
       end if;
-      if (row(18) and column(6) and not sample_busy) = '1' then
+      if REFERENCES = 1 and (row(18) and column(6) and not sample_busy) = '1' then
         settings.u_share <= unsigned(held(15 downto 0));
         written(150)     <= '1';
       end if;
-      if (row(18) and column(7) and not sample_busy) = '1' then
+      if REFERENCES = 1 and (row(18) and column(7) and not sample_busy) = '1' then
         settings.k_voltage <= unsigned(held(23 downto 0));
         written(151)       <= '1';
       end if;
-      if (row(19) and column(0) and not sample_busy) = '1' then
+      if REFERENCES = 1 and (row(19) and column(0) and not sample_busy) = '1' then
         settings.share_min <= unsigned(held(15 downto 0));
         written(152)       <= '1';
       end if;
-      if (row(19) and column(1) and not sample_busy) = '1' then
+      if REFERENCES = 1 and (row(19) and column(1) and not sample_busy) = '1' then
         settings.k_torque <= unsigned(held(23 downto 0));
         written(153)      <= '1';
       end if;
-      if (row(19) and column(2) and not sample_busy) = '1' then
+      if REFERENCES = 1 and (row(19) and column(2) and not sample_busy) = '1' then
         settings.omega_learn <= signed(held(17 downto 0));
         written(154)         <= '1';
       end if;
-      if (row(19) and column(3) and not sample_busy) = '1' then
+      if REFERENCES = 1 and (row(19) and column(3) and not sample_busy) = '1' then
         settings.table_word <= unsigned(held(30 downto 0));
         written(155)        <= '1';
       end if;
-      if (row(19) and column(4) and not sample_busy) = '1' then
+      if ESTIMATORS = 1 and (row(19) and column(4) and not sample_busy) = '1' then
         settings.v_start <= unsigned(held(16 downto 0));
         written(156)     <= '1';
       end if;
-      if (row(19) and column(5) and not sample_busy) = '1' then
+      if REFERENCES = 1 and (row(19) and column(5) and not sample_busy) = '1' then
         settings.torque_step <= signed(held(17 downto 0));
         written(157)         <= '1';
       end if;
-      if (row(20) and column(0) and not sample_busy) = '1' then
+      if POSITION_LOOP = 1 and (row(20) and column(0) and not sample_busy) = '1' then
         settings.position_mode <= held(0);
         written(160)           <= '1';
       end if;
-      if (row(20) and column(1) and not sample_busy) = '1' then
+      if POSITION_LOOP = 1 and (row(20) and column(1) and not sample_busy) = '1' then
         settings.position_target <= signed(held(31 downto 0));
         written(161)             <= '1';
       end if;
-      if (row(20) and column(2) and not sample_busy) = '1' then
+      if POSITION_LOOP = 1 and (row(20) and column(2) and not sample_busy) = '1' then
         settings.position_kp <= unsigned(held(23 downto 0));
         written(162)         <= '1';
       end if;
-      if (row(20) and column(3) and not sample_busy) = '1' then
+      if POSITION_LOOP = 1 and (row(20) and column(3) and not sample_busy) = '1' then
         settings.position_band <= unsigned(held(15 downto 0));
         written(163)           <= '1';
       end if;
-      if (row(20) and column(4) and not sample_busy) = '1' then
+      if POSITION_LOOP = 1 and (row(20) and column(4) and not sample_busy) = '1' then
         settings.omega_most <= signed(held(17 downto 0));
         written(164)        <= '1';
       end if;
-      if (row(20) and column(5) and not sample_busy) = '1' then
+      if POSITION_LOOP = 1 and (row(20) and column(5) and not sample_busy) = '1' then
         settings.move_speed <= unsigned(held(30 downto 0));
         written(165)        <= '1';
       end if;
-      if (row(20) and column(6) and not sample_busy) = '1' then
+      if POSITION_LOOP = 1 and (row(20) and column(6) and not sample_busy) = '1' then
         settings.move_step <= unsigned(held(30 downto 0));
         written(166)       <= '1';
       end if;
-      if (row(20) and column(7) and not sample_busy) = '1' then
+      if POSITION_LOOP = 1 and (row(20) and column(7) and not sample_busy) = '1' then
         settings.jerk_bits <= unsigned(held(2 downto 0));
         written(167)       <= '1';
       end if;
-      if (row(21) and column(0) and not sample_busy) = '1' then
+      if POSITION_LOOP = 1 and (row(21) and column(0) and not sample_busy) = '1' then
         settings.torque_lead <= unsigned(held(2 downto 0));
         written(168)         <= '1';
       end if;
-      if (row(21) and column(1) and not sample_busy) = '1' then
+      if POSITION_LOOP = 1 and (row(21) and column(1) and not sample_busy) = '1' then
         settings.use_stops <= held(0);
         written(169)       <= '1';
       end if;
-      if (row(21) and column(2) and not sample_busy) = '1' then
+      if POSITION_LOOP = 1 and (row(21) and column(2) and not sample_busy) = '1' then
         settings.stop_low <= signed(held(31 downto 0));
         written(170)      <= '1';
       end if;
-      if (row(21) and column(3) and not sample_busy) = '1' then
+      if POSITION_LOOP = 1 and (row(21) and column(3) and not sample_busy) = '1' then
         settings.stop_high <= signed(held(31 downto 0));
         written(171)       <= '1';
       end if;
-      if (row(21) and column(4) and not sample_busy) = '1' then
+      if POSITION_LOOP = 1 and (row(21) and column(4) and not sample_busy) = '1' then
         settings.k_inertia <= unsigned(held(23 downto 0));
         written(172)       <= '1';
       end if;
-      if (row(21) and column(5) and not sample_busy) = '1' then
+      if POSITION_LOOP = 1 and (row(21) and column(5) and not sample_busy) = '1' then
         settings.k_viscous <= unsigned(held(23 downto 0));
         written(173)       <= '1';
       end if;
-      if (row(21) and column(6) and not sample_busy) = '1' then
+      if POSITION_LOOP = 1 and (row(21) and column(6) and not sample_busy) = '1' then
         settings.coulomb <= signed(held(17 downto 0));
         written(174)     <= '1';
       end if;
-      if (row(26) and column(0) and not sample_busy) = '1' then
+      if RESIDUAL = 1 and (row(26) and column(0) and not sample_busy) = '1' then
         settings.residual_min <= unsigned(held(16 downto 0));
         written(208)          <= '1';
       end if;
-      if (row(26) and column(1) and not sample_busy) = '1' then
+      if RESIDUAL = 1 and (row(26) and column(1) and not sample_busy) = '1' then
         settings.residual_w <= unsigned(held(23 downto 0));
         written(209)        <= '1';
       end if;
-      if (row(26) and column(2) and not sample_busy) = '1' then
+      if RESIDUAL = 1 and (row(26) and column(2) and not sample_busy) = '1' then
         settings.residual_i <= unsigned(held(23 downto 0));
         written(210)        <= '1';
       end if;
-      if (row(26) and column(3) and not sample_busy) = '1' then
+      if RESIDUAL = 1 and (row(26) and column(3) and not sample_busy) = '1' then
         settings.residual_samples <= unsigned(held(11 downto 0));
         written(211)              <= '1';
       end if;
-      if (row(26) and column(4) and not sample_busy) = '1' then
+      if RESIDUAL = 1 and (row(26) and column(4) and not sample_busy) = '1' then
         settings.residual_sum_max <= unsigned(held(17 downto 0));
         written(212)              <= '1';
       end if;
-      if (row(26) and column(5) and not sample_busy) = '1' then
+      if RESIDUAL = 1 and (row(26) and column(5) and not sample_busy) = '1' then
         settings.residual_sum_i <= unsigned(held(21 downto 0));
         written(213)            <= '1';
       end if;
-      if (row(27) and column(6) and not sample_busy) = '1' then
+      if RESIDUAL = 1 and (row(27) and column(6) and not sample_busy) = '1' then
         settings.residual_leg <= unsigned(held(16 downto 0));
         written(222)          <= '1';
       end if;
-      if (row(27) and column(7) and not sample_busy) = '1' then
+      if RESIDUAL = 1 and (row(27) and column(7) and not sample_busy) = '1' then
         settings.residual_light <= signed(held(17 downto 0));
         written(223)            <= '1';
       end if;
-      if (row(28) and column(0) and not sample_busy) = '1' then
+      if RESIDUAL = 1 and (row(28) and column(0) and not sample_busy) = '1' then
         settings.residual_slow <= signed(held(17 downto 0));
         written(224)           <= '1';
       end if;

@@ -41,6 +41,7 @@ class Word(NamedTuple):
     kind: str
     doc: str
     reset: int
+    needs: str
     parts: tuple[Part, ...]
 
     @property
@@ -69,6 +70,7 @@ def _word(node: RegNode) -> Word:
         node.get_property("kind"),
         node.get_property("desc"),
         reset,
+        node.get_property("needs") or "",
         parts,
     )
 

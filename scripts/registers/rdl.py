@@ -26,6 +26,7 @@ HEADER = """\
 // means, and which writes are refused, is given in the description of the address map below.
 
 property kind { type = string; component = reg; };  // when a write takes effect, see below
+property needs { type = string; component = reg; };  // generic without which it keeps its reset value, "" for none
 property unit { type = string; component = field; };  // what 1.0 in the format is, "1" for a number; see the bases
 property format { type = string; component = field; };  // S or U(integer bits, fraction bits), per unit of a base
 property port { type = string; component = field; };  // the core's port
@@ -42,7 +43,8 @@ ABOUT = (
     "pulse: set by ones, zero again after one clock. sample pulse: set by a one, zero again after the next sample. "
     "status, constant, generic: read only. A write is a whole word, all four strobes set. SLVERR: value outside low to "
     "high, read-only register, other strobes, or no gap between samples. DECERR: no register at the address of a "
-    "write; a read is OKAY and zero there. A write that is refused changes nothing. Values are per unit: 1.0 of a "
+    "write; a read is OKAY and zero there. A write that is refused changes nothing. A register of a part that the core "
+    "was built without keeps its reset value, and a legal write is OKAY. Values are per unit: 1.0 of a "
     "field's format is what its unit says. "
     "Bases: I_base current at the upper end of the code, U_base half the voltage at full bus code, omega_base pole "
     "pairs times rated speed, unless the drive file gives others; T_s sample time; electrical angles and speeds, peak "
@@ -82,6 +84,7 @@ def render() -> str:
 def _register(register: Register, of_setting: dict[str, str]) -> list[str]:
     reset = version_word() if register.name == "version" else register.reset
     lines = ["  reg {", f"    desc = {_quoted(register.doc)};", f'    kind = "{register.kind.value}";']
+    lines += [f'    needs = "{register.needs}";'] * bool(register.needs)
     for field in register.fields:
         si_unit = of_setting.get(field.name) or units.unit(field.name.removesuffix("_in"))
         unit = motor_map.UNITS.get(field.name) or units.one_is(field.name, si_unit)

@@ -179,7 +179,7 @@ def register_file(words: list[Word], name: str = "register_file") -> str:
         bus=[name for name, *_ in BUS],
         pulses=[(p.port, _zero(p)) for w, p in stored if w.kind == "pulse"],
         sample_pulses=[p.port for w, p in stored if w.kind == "sample pulse"],
-        stores=[(w.index, place(p.port), _from_word(p)) for w, p in stored],
+        stores=[(w.index, place(p.port), _from_word(p), w.needs.upper()) for w, p in stored],
         resets=[(place(p.port), _reset(w, p)) for w, p in stored],
         output_width=max(len(place(part.port)) for _, part in stored),
         kept={w.index: "pulse" not in w.kind for w, _ in stored},

@@ -25,7 +25,7 @@ GENERICS = {
     "clock_hz": 125_000_000,
     "estimators": 0,
     "references": 1,
-    "position_loop": 1,
+    "position_loop": 0,
     "residual": 1,
 }
 MAP = registers()
