@@ -38,6 +38,9 @@ CYCLES, LONGEST_S, LEAST_ROWS, ROWS = 2, 4.0, 30, 400  # torque steps
 MOVES = 0.1  # of that speed: less is no motion
 LEFT_OUT = 0.08  # of a step, at its begin
 HALL_FROM = 0.4  # of the highest speed: Hall sensors, whose angle between the edges is that of the last sector's speed
+SECTOR = TURN_RAD / 6  # between two edges of Hall sensors
+# Mean of a*T*t/2 + a*t**2/2 over a sector passed in T: by how much the angle with the speed of the sector before is late
+LATE = 5.0 / 12.0
 FITS = 4  # with the speed of the fit before; the third changes nothing that counts
 D_CURRENT, LARGEST_I_Q = 0.35, 0.7  # of the limit, held speeds
 SPEED_HZ, FILTER_HZ, HELD_S, ROWS_HELD = 4.0, 40.0, 0.3, 300
@@ -102,7 +105,7 @@ def inertia(session: Session) -> Step:
 class Moving:
     """A torque step without its begin: time [s], place [electrical rad], current [A], speed, as the core sees them.
 
-    ``told``: the rows whose place the encoder tells.
+    ``told``: the rows whose place the encoder tells; ``sector``: the angle between two edges where it is interpolated.
     """
 
     t: np.ndarray
@@ -110,6 +113,7 @@ class Moving:
     current: np.ndarray
     omega: np.ndarray
     told: np.ndarray
+    sector: float = 0.0
 
 
 def _moving(s: Session, piece: Seen) -> Moving:
@@ -118,7 +122,7 @@ def _moving(s: Session, piece: Seen) -> Moving:
     t, omega = piece.t[first:] - piece.t[first], piece.omega_me[first:]
     turns = (-1.0 if s.drive.sensors.position_reverse else 1.0) * s.code_pairs * TURN_RAD
     told = np.abs(omega) > (HALL_FROM * np.abs(omega).max() if s.coarse else -1.0)
-    return Moving(t, turns * piece.code[first:], piece.current[first:], omega, told)
+    return Moving(t, turns * piece.code[first:], piece.current[first:], omega, told, SECTOR if s.coarse else 0.0)
 
 
 def torque_fit(pieces: list[Moving]) -> tuple[np.ndarray, np.ndarray, float]:
@@ -137,7 +141,9 @@ def _fit(pieces: list[Moving]) -> tuple[np.ndarray, np.ndarray, float]:
     """((K, b, c), standard uncertainties of the residuals, their rms).
 
     The core's speed lags by its filter, so that the friction would turn its sign too late, and its angle is wrong
-    between the edges of Hall sensors: from the second fit on, speed and angle are those of the fit before.
+    between the edges of Hall sensors: from the second fit on, speed and angle are those of the fit before.  What an
+    accelerated shaft is late between the edges, (5/12)*a*(sector/omega)^2 in the mean, is smooth, so no residual shows
+    it: what it moves in the fit counts as uncertainty.
     """
     theta, told = np.concatenate([p.theta for p in pieces]), np.concatenate([p.told for p in pieces])
     theta, speeds, currents = theta[told], [p.omega for p in pieces], [np.imag(p.current) for p in pieces]
@@ -158,8 +164,14 @@ def _fit(pieces: list[Moving]) -> tuple[np.ndarray, np.ndarray, float]:
         angles = np.split(whole @ found, np.cumsum([len(p.t) for p in pieces])[:-1])
         currents = [np.imag(p.current * np.exp(1j * (p.theta - at))) for p, at in zip(pieces, angles, strict=True)]
         speeds = [part @ np.r_[found[2 * n + 1], found[-3:]] for n, part in enumerate(speeds)]
+    late = []
+    for p, omega, i_q in zip(pieces, speeds, currents, strict=True):
+        rate = found[-3] * i_q - found[-2] * np.sign(omega) - found[-1] * omega
+        late.append(LATE * rate[p.told] * (p.sector / np.maximum(np.abs(omega[p.told]), 1e-9)) ** 2)
+    moved = np.linalg.lstsq(matrix / scale, np.concatenate(late), rcond=None)[0] / scale
     like = float(np.clip(np.corrcoef(rest[1:], rest[:-1])[0, 1], 0.0, 0.99))
-    return found[-3:], sigma[-3:] * math.sqrt((1.0 + like) / (1.0 - like)), rms  # neighbours resemble each other
+    sigma = sigma[-3:] * math.sqrt((1.0 + like) / (1.0 - like))  # neighbours resemble each other
+    return found[-3:], np.hypot(sigma, moved[-3:]), rms
 
 
 def _integral(t: np.ndarray, x: np.ndarray) -> np.ndarray:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 from fluxproof.checkout import DRIVES
 from golden_model.drive import Drive, load, with_carrier
 from golden_model.drive_keys import needed
+from golden_model.registers import registers
 from studies.rough.board import RoughBoard
 
 CARRIER_HALF = 250
@@ -24,6 +25,7 @@ HALLS = ("hub_36v",)
 SPEEDS = (0.03, 0.1, 0.3, 0.8)
 ALLOWED_S = {0.03: 0.05, 0.1: 0.005, 0.3: 0.005, 0.8: 0.005}  # until a lost encoder is named
 HALL_ALLOWED_S = 0.1  # an edge tells the speed
+UNSEEN_ALLOWED_S = 0.15  # the same where emf_check cannot see the EMF: stall_s, and the way to the current limit
 
 
 class Situation(NamedTuple):
@@ -147,6 +149,17 @@ def dead(board: RoughBoard) -> None:
     board.spoil = spoil
 
 
+def below_the_emf_check(drive: Drive, part: float) -> bool:
+    """Whether the EMF of this speed is smaller than emf_check's limit without a current.
+
+    A field that stands with the frozen code then holds the rotor before its EMF contradicts: what is left is the stall,
+    as soon as the speed regulator has come to the current limit.
+    """
+    m, si = drive.machine, {row.name: row.si for row in registers(drive).rows}
+    omega = part * m.pole_pairs * m.rated_speed_rad_s
+    return m.magnet_flux_wb * omega < si["emf_min"] + si["emf_w"] * omega
+
+
 def lost(how: Callable[[RoughBoard], None], names: tuple[str, ...]):
     def play(drive: Drive, part: float) -> tuple[str, bool]:
         board = running(drive, part)
@@ -154,9 +167,12 @@ def lost(how: Callable[[RoughBoard], None], names: tuple[str, ...]):
             return f"{', '.join(board.faults)} before the encoder is lost", False
         since = board.period
         how(board)
-        board.until_off(0.15)
+        board.until_off(UNSEEN_ALLOWED_S)
         allowed = HALL_ALLOWED_S if drive.encoder.kind == "hall" else ALLOWED_S[part]
         board.farthest[0] = 0.0  # at this speed nothing turns the wrong way
+        if below_the_emf_check(drive, part):
+            seen, good = verdict(board, (*names, "stall"), UNSEEN_ALLOWED_S, since)
+            return seen, good or (not board.faults and board.peak_a < drive.current_limit_a)
         return verdict(board, names, allowed, since)
 
     return play
@@ -207,7 +223,9 @@ def trip_and_clear(drive: Drive, _part: float) -> tuple[str, bool]:
 
 
 ALL = (*EDGES, *HALLS, *ABSOLUTE)
-LOST, NAMED = ("encoder_lost", "position"), "encoder_lost or position in 5 ms, in 50 ms at 3 %"
+LOST = ("encoder_lost", "position")
+NAMED = "encoder_lost or position in 5 ms, in 50 ms at 3 %; where emf_check cannot see the EMF: those or stall in 150 ms,"
+NAMED += " or less than the current limit"
 TABLE = (
     Situation("healthy", "no fault", ALL, (0.0, *SPEEDS), healthy),
     Situation("enabled before the index", "no_index, gates never on", EDGES, (0.0,), before_the_index),
