@@ -100,6 +100,36 @@ def test_torque_steps_with_a_late_speed_and_a_wrong_angle(hall):
     assert sigma[0] < 0.002 * k and sigma[1] < 0.25 * b
 
 
+def test_torque_steps_by_the_angle_between_hall_edges():
+    """The frame turns as hall_angle has it: late while the shaft accelerates, behind a reversal far from the rotor."""
+    k, b, c, fine, sector = 388.0, 112.0, 0.25, 1e-4, motion.SECTOR
+    pieces, at, speed, edge, passed, since, onward, forward = [], 0.1, 0.0, 0.0, 1e-2, 0.0, True, True
+    for sign in (1.0, -1.0, 1.0, -1.0, 1.0):
+        rows = []
+        while speed * sign < 300.0:
+            if not 0.0 <= at - edge < sector:
+                up = at > edge
+                edge += sector if up else -sector
+                onward, forward, passed, since = up == forward, up, max(since, fine), 0.0
+            share = since / passed
+            place = (share - 0.5 if share < 1.0 else 0.5 / share) if onward else (min(share, 1.0) - 1.0) / 2.0
+            code = edge + sector * (0.5 + (place if forward else -place))
+            rows.append((code, speed))
+            for _ in range(4):
+                at += fine / 4 * speed
+                speed += fine / 4 * (k * 6.0 * sign * np.cos(at - code) - b * np.sign(speed) - c * speed)
+            since += fine
+        codes, omega = np.array(rows)[::4].T
+        told, current = np.abs(omega) > 0.4 * 300.0, np.full(len(codes), 6j * sign)
+        pieces.append(motion.Moving(4 * fine * np.arange(len(codes)), codes, current, omega, told, sector))
+    found, sigma, _ = motion.torque_fit(pieces)
+    assert abs(found[0] / k - 1.0) < 0.003 and sigma[0] < 0.005 * k, (found, sigma)
+    fine_encoder = [replace(p, sector=0.0) for p in pieces]
+    assert (
+        motion.torque_fit(fine_encoder)[0][0] < 0.995 * k
+    )  # as if an encoder told the angle
+
+
 @pytest.mark.slow
 def test_two_sensors_are_enough_to_find_a_swapped_one():
     motor = case(1002)

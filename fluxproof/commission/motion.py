@@ -28,6 +28,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from fluxproof.commission.session import Refusal, Seen, Session, Step, Value, solve
 from golden_model.units import TURN_RAD, from_si
@@ -39,8 +40,9 @@ MOVES = 0.1  # of that speed: less is no motion
 LEFT_OUT = 0.08  # of a step, at its begin
 HALL_FROM = 0.4  # of the highest speed: Hall sensors, whose angle between the edges is that of the last sector's speed
 SECTOR = TURN_RAD / 6  # between two edges of Hall sensors
-# Mean of a*T*t/2 + a*t**2/2 over a sector passed in T: by how much the angle with the speed of the sector before is late
+# Mean of a*T*t/2 + a*t**2/2 over a sector passed in T: what the angle with the speed of the sector before is late
 LATE = 5.0 / 12.0
+HALL_FITS = 12  # the same with Hall sensors, see _fit
 FITS = 4  # with the speed of the fit before; the third changes nothing that counts
 D_CURRENT, LARGEST_I_Q = 0.35, 0.7  # of the limit, held speeds
 SPEED_HZ, FILTER_HZ, HELD_S, ROWS_HELD = 4.0, 40.0, 0.3, 300
@@ -141,37 +143,63 @@ def _fit(pieces: list[Moving]) -> tuple[np.ndarray, np.ndarray, float]:
     """((K, b, c), standard uncertainties of the residuals, their rms).
 
     The core's speed lags by its filter, so that the friction would turn its sign too late, and its angle is wrong
-    between the edges of Hall sensors: from the second fit on, speed and angle are those of the fit before.  What an
-    accelerated shaft is late between the edges, (5/12)*a*(sector/omega)^2 in the mean, is smooth, so no residual shows
-    it: what it moves in the fit counts as uncertainty.
+    between the edges of Hall sensors: from the second fit on, speed and angle are those of the fit before.
+
+    Hall sensors.  Near standstill nobody tells the place, and the q current depends on it: di_q/dtheta = -i_d.  A fit
+    with the place of the fit before diverges there, so the new place stands in its own equation, linear in it:
+    theta + K*(double integral of i_d*theta) = the others.  Between the edges the angle of an accelerated shaft is
+    late by LATE*a*(sector/omega)^2 in the mean, which is smooth, so that no residual would show it.
     """
-    theta, told = np.concatenate([p.theta for p in pieces]), np.concatenate([p.told for p in pieces])
-    theta, speeds, currents = theta[told], [p.omega for p in pieces], [np.imag(p.current) for p in pieces]
-    for _ in range(FITS):
-        blocks = []
-        for n, (p, omega, i_q) in enumerate(zip(pieces, speeds, currents, strict=True)):
+    told = np.concatenate([p.told for p in pieces])
+    coarse = any(p.sector for p in pieces)
+    twice = [_integrator(p.t) @ _integrator(p.t) if coarse else np.zeros((0, 0)) for p in pieces]
+    speeds, currents = [p.omega for p in pieces], [p.current for p in pieces]
+    late, angles, k = [np.zeros(len(p.t)) for p in pieces], [p.theta for p in pieces], 0.0
+    for _ in range(HALL_FITS if coarse else FITS):
+        blocks, given = [], []
+        for n, (p, omega, current) in enumerate(zip(pieces, speeds, currents, strict=True)):
             own = np.zeros((len(p.t), 2 * len(pieces)))
             own[:, 2 * n], own[:, 2 * n + 1] = 1.0, p.t
-            parts = [_integral(p.t, part) for part in (i_q, -np.sign(omega), -omega)]
-            blocks.append(np.column_stack([own, *(_integral(p.t, part) for part in parts)]))
+            parts = [_integral(p.t, part) for part in (np.imag(current), -np.sign(omega), -omega)]
+            columns = np.column_stack([own, *(_integral(p.t, part) for part in parts), np.zeros(len(p.t))])
+            if coarse:
+                turned = k * twice[n] * np.real(current)
+                columns[:, -1] = turned @ angles[n]
+                columns = solve_triangular(np.eye(len(p.t)) + turned, columns, lower=True)
+            blocks.append(columns[:, :-1])
+            given.append(columns[:, -1])
             speeds[n] = np.column_stack([np.ones(len(p.t)), *parts])
-        whole = np.vstack(blocks)
+        whole, known = np.vstack(blocks), np.concatenate(given)
+        theta = (np.concatenate([p.theta + lag for p, lag in zip(pieces, late, strict=True)]) - known)[told]
         matrix = whole[told]
         scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-30)
         found, sigma, rms = solve(matrix / scale, theta)
         rest = theta - matrix / scale @ found
         found, sigma = found / scale, sigma / scale
-        angles = np.split(whole @ found, np.cumsum([len(p.t) for p in pieces])[:-1])
-        currents = [np.imag(p.current * np.exp(1j * (p.theta - at))) for p, at in zip(pieces, angles, strict=True)]
+        k = found[-3]
+        angles = np.split(whole @ found + known, np.cumsum([len(p.t) for p in pieces])[:-1])
+        currents = [p.current * np.exp(1j * (p.theta - at)) for p, at in zip(pieces, angles, strict=True)]
         speeds = [part @ np.r_[found[2 * n + 1], found[-3:]] for n, part in enumerate(speeds)]
-    late = []
-    for p, omega, i_q in zip(pieces, speeds, currents, strict=True):
-        rate = found[-3] * i_q - found[-2] * np.sign(omega) - found[-1] * omega
-        late.append(LATE * rate[p.told] * (p.sector / np.maximum(np.abs(omega[p.told]), 1e-9)) ** 2)
-    moved = np.linalg.lstsq(matrix / scale, np.concatenate(late), rcond=None)[0] / scale
+        late = [_late(p, found[-3:], omega, i) for p, omega, i in zip(pieces, speeds, currents, strict=True)]
     like = float(np.clip(np.corrcoef(rest[1:], rest[:-1])[0, 1], 0.0, 0.99))
-    sigma = sigma[-3:] * math.sqrt((1.0 + like) / (1.0 - like))  # neighbours resemble each other
-    return found[-3:], np.hypot(sigma, moved[-3:]), rms
+    return found[-3:], sigma[-3:] * math.sqrt((1.0 + like) / (1.0 - like)), rms  # neighbours resemble each other
+
+
+def _late(piece: Moving, found: np.ndarray, omega: np.ndarray, current: np.ndarray) -> np.ndarray:
+    """By how much the place between the edges is late, in the mean of a sector [rad]; of rows that are told."""
+    k, b, c = found
+    rate = k * np.imag(current) - b * np.sign(omega) - c * omega
+    passed = np.divide(piece.sector, np.abs(omega), out=np.zeros(len(omega)), where=piece.told & (omega != 0.0))
+    return LATE * rate * passed**2
+
+
+def _integrator(t: np.ndarray) -> np.ndarray:
+    """The matrix of ``_integral``."""
+    half = 0.5 * np.diff(t)
+    matrix = np.zeros((len(t), len(t)))
+    matrix[1:, :-1] = np.tril(np.tile(half, (len(half), 1)))
+    matrix[1:, 1:] += np.tril(np.tile(half, (len(half), 1)))
+    return matrix
 
 
 def _integral(t: np.ndarray, x: np.ndarray) -> np.ndarray:
