@@ -125,9 +125,7 @@ def test_torque_steps_by_the_angle_between_hall_edges():
     found, sigma, _ = motion.torque_fit(pieces)
     assert abs(found[0] / k - 1.0) < 0.003 and sigma[0] < 0.005 * k, (found, sigma)
     fine_encoder = [replace(p, sector=0.0) for p in pieces]
-    assert (
-        motion.torque_fit(fine_encoder)[0][0] < 0.995 * k
-    )  # as if an encoder told the angle
+    assert motion.torque_fit(fine_encoder)[0][0] < 0.995 * k  # as if an encoder told the angle
 
 
 @pytest.mark.slow
