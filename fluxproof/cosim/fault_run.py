@@ -30,7 +30,7 @@ Steps = Sequence[tuple[dict[str, int], int]]
 WRITE = ("s_axi_awaddr", "s_axi_wdata", "s_axi_awvalid", "s_axi_wvalid")
 READ = ("s_axi_araddr", "s_axi_arvalid")
 WATCHED = ("fault_flags", "first_fault", "board_flags", "board_first", "irq_cause")
-INDEX, LOST, OVER = 1, 2, 4  # bits of board_ignore
+INDEX, LOST, OVER, NO_INDEX, HALL = 1, 2, 4, 8, 16  # bits of board_ignore
 CURRENT = PU.to_int(0.05)  # the voltage that a regulator without a motor asks for grows, and the duties with it
 HEARTBEAT = 3  # periods
 LENGTHS = (32, 31, 30, 29, 27, 25, 23, 22, 21, 19, 17, 13)  # of the fast overcurrent's filter, in bits
@@ -238,7 +238,7 @@ def each_limit() -> Steps:
 
     What a bit of a limit does shows where the total has this bit, or has it not: with enough lengths, both.
     """
-    steps: list[tuple[dict[str, int], int]] = [({"board_ignore": LOST | OVER}, 0)]
+    steps: list[tuple[dict[str, int], int]] = [({"board_ignore": LOST | OVER | NO_INDEX | HALL}, 0)]
     none, most = {"irq_mask": 0, "heartbeat": 0}, TOTAL.hi  # writes that give the filter time before the clear
     for length in LENGTHS:
         total = length**3
@@ -301,7 +301,8 @@ def serial_run() -> FaultRun:
         inputs["trip"][220 : 221 + FILTERED] = k == at + 2
 
     drive = serial_and_modulators()
-    limits = [*each_limit(), *rail(), ({"trip_oversampling": board_registers(drive)["trip_oversampling"]}, 2)]
+    lost: Steps = [({"board_ignore": OVER}, 2), ({"board_ignore": LOST | OVER}, 0), ({"clear_trip": 1}, 1)]
+    limits = [*each_limit(), *rail(), *lost, ({"trip_oversampling": board_registers(drive)["trip_oversampling"]}, 2)]
     known: Steps = [
         ({"clear_encoder": 1, "clear_trip": 1}, 1),
         ({"board_ignore": LOST}, 1), ({"clear_trip": 1}, 2), ({"board_ignore": 0}, 2),
@@ -335,7 +336,8 @@ def edges_run() -> FaultRun:
         inputs["pin_b"][:] = (count % 4 == 2) | (count % 4 == 3)
         place = 8 if 6 <= k < 9 or k >= 16 else 0
         inputs["pin_z"][:] = count % 16 == place
-        at = 5 + np.arange(len(clocks) // 160) * 160
+        # Once the codes come after the position, once there are none
+        at = (60 if k == begin + 9 else 5) + np.arange(len(clocks) // 160 * (k != begin + 11)) * 160
         inputs["codes_valid_in"][at] = 1
         for name in ("code_b_in", "code_c_in"):
             inputs[name][:] = 1 << 15
@@ -344,7 +346,12 @@ def edges_run() -> FaultRun:
         inputs["trip"][70:71] = k == 20 + HEARTBEAT + 11
 
     begin, usual = max(script) + 2, board_registers(edges())
-    patient = [*rail(), ({"clear_trip": 1}, 1), *each_fault(edges(), 3), *each_mask(usual)]
+    unknown: Steps = [
+        ({"board_ignore": INDEX | NO_INDEX}, 0), ({"clear_encoder": 1}, 1), ({"clear_trip": 1}, 2),
+        ({"board_ignore": INDEX | NO_INDEX | HALL}, 2), ({"board_ignore": INDEX}, 3),
+        ({"board_ignore": INDEX | NO_INDEX}, 0), ({"clear_trip": 1}, 1),
+    ]  # fmt: skip
+    patient = [*rail(), ({"clear_trip": 1}, 7), *each_fault(edges(), 3), *each_mask(usual), *unknown]
     run = FaultRun(edges(), script, pins, patient)
     stands = run.periods * run.length  # clock from which the shaft stands
     return run
