@@ -224,8 +224,8 @@ def trip_and_clear(drive: Drive, _part: float) -> tuple[str, bool]:
 
 ALL = (*EDGES, *HALLS, *ABSOLUTE)
 LOST = ("encoder_lost", "position")
-NAMED = "encoder_lost or position in 5 ms, in 50 ms at 3 %; where emf_check cannot see the EMF: those or stall in 150 ms,"
-NAMED += " or less than the current limit"
+NAMED = "encoder_lost or position in 5 ms, in 50 ms at 3 %; where emf_check cannot see the EMF: or stall in 150 ms, or"
+NAMED += " less than the current limit"
 TABLE = (
     Situation("healthy", "no fault", ALL, (0.0, *SPEEDS), healthy),
     Situation("enabled before the index", "no_index, gates never on", EDGES, (0.0,), before_the_index),
