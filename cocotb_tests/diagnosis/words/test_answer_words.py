@@ -197,6 +197,18 @@ def test_a_share_is_of_the_alternatives_too():
     assert alone.startswith("One of currents delayed by a filter and delay of voltage or angle explains "), alone
 
 
+def test_what_is_certain_is_told_from_what_takes_its_place():
+    """Of a saturating machine eleven effects were not separable, two of which were in every probable set."""
+    found = {"saturation": 0.99, "cross_saturation": 0.98, "udc_gain": 0.6, "resistance": 0.4}
+    alternatives = tuple(replace(named(n), confidence=p) for n, p in found.items())
+    answer = replace(made_up()["ambiguous"], effects=(), ambiguity=(tuple(found),), alternatives=alternatives)
+    text = headline(answer, KNOWN)
+    assert text.startswith("This recording cannot separate gain error of the bus voltage sensor"), text
+    assert text.endswith(", on which the size of saturation of an axis by its own current and 1 more depends."), text
+    twins = replace(answer, ambiguity=(("saturation", "udc_gain"),))
+    assert "on which" not in headline(twins, KNOWN)
+
+
 def test_an_effect_outside_the_catalogue_is_called_by_its_meaning():
     assert Parameter("x_a", "A", "its amplitude").called == "its amplitude"
     answer = replace(
