@@ -13,6 +13,7 @@ from fluxproof.diagnosis.balance.holdout import held_out, holdout_blocks
 from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.balance.parts import sound
 from fluxproof.diagnosis.balance.slow_view import SlowView, slow_view
+from fluxproof.diagnosis.balance.used import little_used
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.conventions.restated import as_read
 from fluxproof.diagnosis.decide.conclude import conclude
@@ -54,7 +55,7 @@ def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: Non
     if any(r.fatal for r in used):
         return explained(not_compared("bad_recording"), used)
     decision = restated(_decision(used, nominal, progress, shifts), changed)
-    return explained(decision, used, next_recording(decision, progress))
+    return explained(decision, used, next_recording(decision, progress), little_used(used))
 
 
 def explained(decision: Decision, used: list[Recording], planned=(), more: tuple[Problem, ...] = ()) -> Explained:

@@ -26,6 +26,7 @@ SPEEDS = (0.1, 0.4, 0.7, 0.95, -0.5)  # of the rated speed
 POINTS = (0.0, -0.4 + 0.5j, 0.9j, -0.6j)  # of the rated current
 ROWS, ROW_S = 20, 0.05  # of a point in the slow log
 ROOM = 0.05  # of a value: interval of its size
+NONE = (0.0, 0.0)  # interval of the form that is not there: a late angle is no late voltage
 
 
 def _held(machine, rows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -46,10 +47,11 @@ def _wrong(kind, machine, tau, i, omega, u):
     near = lambda x: tuple(sorted(((1 - ROOM) * x, (1 + ROOM) * x)))  # noqa: E731
     others = lambda name: tuple(n for n in CLASS if n != name)  # noqa: E731
     if kind == "angle":
-        turn = np.exp(1j * omega * tau)
-        return i * turn, u * turn, Cause(("sampling_skew",), {"skew_s": near(tau)}, others("sampling_skew"))
+        turn, sizes = np.exp(1j * omega * tau), {"skew_s": near(tau), "angle_late_s": near(tau), "delay_s": NONE}
+        return i * turn, u * turn, Cause(("sampling_skew", "delay"), sizes, ("iron_loss",))
     if kind == "filter":
-        return i, u / (1 + 1j * omega * tau), Cause(("delay",), {"delay_s": near(-tau)}, others("delay"))
+        sizes = {"delay_s": near(-tau), "angle_late_s": NONE}
+        return i, u / (1 + 1j * omega * tau), Cause(("delay",), sizes, others("delay"))
     emf = machine["pole_pairs"] * machine["rated_speed_rad_s"] * machine["magnet_flux_wb"]
     ohm = emf / (SHARE * machine["rated_current_a"])
     lost = 1j * omega * _flux(machine, i) / ohm

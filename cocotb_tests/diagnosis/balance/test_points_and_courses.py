@@ -14,7 +14,7 @@ from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.joined import joined_views
 from fluxproof.diagnosis.balance.misfit import bulge
 from fluxproof.diagnosis.balance.operating_points import point_numbers
-from fluxproof.diagnosis.balance.point_rows import WHOLE_TURN, block_points, whole_turns
+from fluxproof.diagnosis.balance.point_rows import block_points, whole_turns
 from fluxproof.diagnosis.ground.nominal import load_nominal
 
 NOMINAL = load_nominal(PAPER)
@@ -69,7 +69,7 @@ def test_points_of_fast_rows_cover_a_turn(view):
     points = block_points(recorded(), NOMINAL)
     turned = (points.end - points.first) * np.abs(points.omega) * NOMINAL.sample_time_s
     assert np.ptp(view.theta, axis=1).min() < 2.0 and 0 < len(points) < len(view)
-    assert not np.isfinite(points.rest).any() and (turned > 0.9 * WHOLE_TURN).all()
+    assert not np.isfinite(points.rest).any() and (turned > 0.8 * 2.0 * np.pi).all()
 
 
 def test_blocks_of_one_dwell_are_a_turn_together():

@@ -13,6 +13,7 @@ from fluxproof.diagnosis.balance.messages import message_period
 from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.balance.slow_stretches import Stretches, stretches, stretches_in_motion
 from fluxproof.diagnosis.balance.slow_view import alike, slow_view
+from fluxproof.diagnosis.balance.used import little_used
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.ground.machine import steady_voltage
 from fluxproof.diagnosis.ground.nominal import load_nominal
@@ -158,13 +159,36 @@ def test_held_messages_are_not_balanced_in_motion():
     assert stretches_in_motion(recording, nominal) is None
 
 
-@pytest.mark.parametrize("kind, name", [("filter", "delay"), ("iron", "iron_loss")])
-def test_operating_points_show_what_is_late(kind, name, tmp_path):
-    """Both follow omega^2 on the d axis; a late voltage was unknown in a table."""
+@pytest.mark.parametrize(
+    "kind, name, key",
+    [
+        ("filter", "delay", "delay_s"),
+        ("angle", "delay", "angle_late_s"),
+        ("iron", "iron_loss", "iron_resistance_ohm"),
+    ],
+)
+def test_operating_points_show_what_is_late(kind, name, key, tmp_path):
+    """All follow omega^2 on the d axis; a late angle was told as a late voltage beside a wrong inductance."""
     (chosen,) = [c for c in late.cases() if c.name == f"late.drone_24v_table_{kind}"]
     (recording,), drive = chosen.files(tmp_path)
     nominal = load_nominal(drive)
     answer = diagnose(load_recording(recording, nominal), nominal)
-    ((key, (low, high)),) = chosen.truth.causes[0].sizes.items()
+    low, high = chosen.truth.causes[0].sizes[key]
     assert [e.name for e in answer.effects] == [name] and not answer.ambiguity, answer.sentence
     assert low < answer.effects[0].parameters[key].value < high
+
+
+def test_little_of_a_recording_is_told_with_the_reason():
+    """23 of 162 blocks were compared without a word."""
+    recording = log()
+    slow_view(recording, NOMINAL)
+    rows, steady, used = len(recording), recording.meta["rows_steady"], recording.meta["rows_used"]
+    assert 0 < used <= steady < rows
+    recording.meta |= {"rows_steady": rows // 2, "rows_used": rows // 4}
+    recording.usable[: rows - rows // 2 - rows // 10] = False
+    (found,) = little_used([recording])
+    assert found.count == rows - rows // 4 and f"({rows // 4} of {rows})" in found.message
+    assert "set aside by the checks" in found.action and "held long or repeated" in found.action
+    assert not found.fatal and "10 % where current" in found.action, found.action
+    recording.meta["rows_used"] = rows // 2 + 1
+    assert little_used([recording]) == ()

@@ -347,6 +347,15 @@ def test_a_documented_prefix_is_named_beside_the_nameplate(tmp_path, nominal):
     assert "as documented" in finding.message and "rated_current_a" in finding.message and "1000" in finding.message
 
 
+def test_inductances_that_are_too_large_are_no_prefix_of_the_currents(tmp_path, nominal):
+    """Without currents any balance is met: a table of a motor at 17 A was refused, as it needed a millionth of them."""
+    machine = nominal.machine
+    large = {key: 8.0 * getattr(machine, key) for key in ("inductance_d_h", "inductance_q_h")}
+    wrong = dataclasses.replace(nominal, machine=dataclasses.replace(machine, **large))
+    path = write(tmp_path / "r.parquet", {name: values[400:1300] for name, values in made().items()})
+    assert "unit" not in codes(load_recording(path, wrong))
+
+
 def test_an_angle_in_rad_under_a_header_in_degrees(tmp_path, nominal):
     table = made()
     header = {f"{name} [deg]" if name == "theta_e" else name: values for name, values in table.items()}

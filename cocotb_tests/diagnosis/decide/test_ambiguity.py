@@ -11,8 +11,10 @@ import pytest
 from cocotb_tests.support.drives import PAPER
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.decide.ambiguity import alternatives, ambiguities
+from fluxproof.diagnosis.decide.bent import bent_groups
 from fluxproof.diagnosis.decide.names import _sized, names_of
 from fluxproof.diagnosis.ground.nominal import load_nominal
+from fluxproof.diagnosis.inference.posterior import Posterior
 
 
 def kept(*sets) -> list:
@@ -71,6 +73,32 @@ def test_an_alternative_without_a_size_is_left_out():
     )
     found = names_of(posterior)
     assert found.ambiguous == (("magnet_flux", "resistance"),) and found.possible == {"delay": 0.2}
+
+
+@pytest.mark.parametrize("agrees, first", [(True, ""), (False, "a")])
+def test_a_misfit_that_is_no_noise_has_a_cause(agrees, first):
+    """Resistance or dead time held 0.92 of the probability, none 0.07: nothing was said of a misfit of three floors."""
+    fits = {names: SimpleNamespace(names=names, value=value) for names, value in (((), 1.0), (("a",), 0.0))}
+    ((p, fit), *others) = Posterior(SimpleNamespace(), fits, agrees=agrees).weights()
+    assert (
+        "".join(fit.names) == first and len(others) == agrees and p == pytest.approx(1.0 if first else 0.731, abs=1e-3)
+    )
+    alone = Posterior(SimpleNamespace(), {(): fits[()]}, agrees=False)
+    assert [fit.names for _, fit in alone.weights()] == [()]
+
+
+@pytest.mark.parametrize(
+    "bend, beside, groups", [(0.5, (), ()), (0.7, (), (("inductance_q", "saturation"),)), (0.7, ("saturation",), ())]
+)
+def test_an_inductance_that_changes_with_the_current_may_be_a_saturation(bend, beside, groups):
+    """Of a measured flux map L_q was 'off the nameplate', with a bend of twice its size."""
+    keys = [("inductance_q", "delta_l_q"), ("inductance_q", "bend_2")]
+    points = SimpleNamespace(x=np.array([[1.0, 0.0], [0.0, 1.0]]), level=np.ones(2))
+    cells = SimpleNamespace(free=frozenset(keys[1:]))
+    problem = SimpleNamespace(setup=SimpleNamespace(effects=CATALOGUE), keys=keys, p=points, cells=cells)
+    fit = SimpleNamespace(problem=problem, names=("inductance_q", *beside), take=[0, 1], vector=[1.0, bend],
+                          places={"inductance_q": [0, 1]})  # fmt: skip
+    assert bent_groups(("inductance_q", "resistance"), fit, CATALOGUE) == groups
 
 
 def test_groups_are_connected():

@@ -23,6 +23,16 @@ def test_absurd_sizes_are_impossible():
     assert not possible(alone)
 
 
+def test_of_forms_that_exclude_each_other_a_possible_one_is_taken(monkeypatch):
+    """A late voltage that gains amplitude stood for a late angle, so that no delay was possible at all."""
+    view = slow_view(log(), NOMINAL)
+    view = view.turned(2e-5 * view.omega)
+    problem = Problem(Setup(view, {"delay": CATALOGUE["delay"]}, np.ones(len(view), bool)))
+    assert problem.fit(("delay",)).c["delay"]["angle"]
+    monkeypatch.setattr(type(CATALOGUE["delay"]), "possible", lambda effect, c, *_: not c.get("angle"))
+    assert problem.fit(("delay",)).c["delay"]["tau"]
+
+
 @pytest.mark.parametrize("share, costs", [(0.95, False), (0.6, False), (0.4, True)])
 def test_an_implausible_value_costs(share, costs, monkeypatch):
     """Else a sum of absurd effects that cancel is preferred to the true ones."""

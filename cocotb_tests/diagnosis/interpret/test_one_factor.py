@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,11 +15,14 @@ from cocotb_tests.support.recordings.bench_logs import GRID, Truth, table
 from cocotb_tests.support.recordings.from_equations import nominal_of, write
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.conventions.table import READINGS
+from fluxproof.diagnosis.decide.interpretation import is_simpler
 from fluxproof.diagnosis.effects.drive_file import restated
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import Recording
 from fluxproof.diagnosis.inference.problem import Problem
+from fluxproof.diagnosis.inference.search import search
 from fluxproof.diagnosis.inference.setup import Setup
+from fluxproof.diagnosis.interpret import judge
 from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.physics import rows_of, view_and_held
 from fluxproof.diagnosis.plan.request import requests
@@ -134,3 +138,22 @@ def test_a_locked_rotor_whose_resistance_is_off_by_a_usual_factor_shows_a_resist
     answer = answer_of(tmp_path, {"i_q": i_q, "u_q_ref": u}, more)
     assert not answer.conventions and [e.name for e in answer.effects] == ["resistance"], answer.sentence
     assert found(answer)["resistance_ohm"] == pytest.approx(factor * R, rel=0.02)
+
+
+def test_a_convention_that_loses_alone_is_not_searched(tmp_path, monkeypatch):
+    """Half of the time of a diagnosis went into sets of effects of which none may stand beside the convention."""
+    nominal = nominal_of(tmp_path)
+    recording = load_recording(write(tmp_path / "r.csv", table(Truth(psi=1.9 * PSI))), nominal)
+    view, held = view_and_held([recording], nominal)
+    posterior = search(Setup.of(rows_of(view, held)))
+    read = []
+    monkeypatch.setattr(judge, "_read", lambda *args, kept=judge._read: (read.append(args), kept(*args))[1])
+    monkeypatch.setattr(judge, "search", lambda *args: pytest.fail("searched"))
+    assert judge.preferred([recording], posterior, True)[0] == () and read
+
+
+def test_two_factors_are_not_simpler_than_one_constant():
+    """A magnet flux of half its value in the drive file was told as voltages and R, L at twice the true ones."""
+    one, two = (tuple(SimpleNamespace(pole_pairs=0) for _ in range(n)) for n in (1, 2))
+    assert is_simpler(one, (), 1, absurd=False) and not is_simpler(two, (), 1, absurd=False)
+    assert is_simpler(two, (), 2, absurd=False) and is_simpler(two, (), 1, absurd=True)

@@ -14,6 +14,7 @@ from fluxproof.diagnosis.balance.curves import parabola
 from fluxproof.diagnosis.balance.quantised_angle import angle_step
 from fluxproof.diagnosis.balance.settling import settled
 from fluxproof.diagnosis.balance.shaft import airgap, is_airgap, shaft_kind
+from fluxproof.diagnosis.balance.used import count_rows
 from fluxproof.diagnosis.balance.view import HALF_WIDTH, SLOPE_REACH, View, lacking
 from fluxproof.diagnosis.ground.arrays import Complex
 from fluxproof.diagnosis.ground.nominal import flux_level
@@ -245,6 +246,7 @@ def _cut(recording, nominal, run, i_s, omega, block_rows):
         number = np.searchsorted(recording.meta["windows"], recording["t"][starts + length // 2], side="right")
         keep = np.unique(number, return_index=True)[1]
         starts, dwell = starts[keep], dwell[keep]
+    count_rows(recording, len(starts) * length, min(len(starts), MOST_BLOCKS) * length)
     if len(starts) > MOST_BLOCKS:
         keep = np.unique(np.linspace(0, len(starts) - 1, MOST_BLOCKS).round().astype(int))
         starts, dwell = starts[keep], dwell[keep]

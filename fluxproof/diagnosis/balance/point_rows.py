@@ -13,6 +13,7 @@ import numpy as np
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.slow_columns import known_angle, known_voltage, operating_columns, torque_at_shaft
 from fluxproof.diagnosis.balance.slow_stretches import AT_REST, STANDING, STILL, Stretches
+from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.machine import steady_voltage
 from fluxproof.diagnosis.ground.nominal import flux_level
 from fluxproof.diagnosis.ground.recording import RecordingError
@@ -20,7 +21,6 @@ from fluxproof.diagnosis.ground.recording import RecordingError
 MEANS = 64  # number of means of a long operating point, fine enough for its drift
 SAME_SPEED = 0.02  # relative
 NO_LOSS = 0.005  # of rated current: a smaller one has no loss that could be noticed
-WHOLE_TURN = 0.95 * 2.0 * np.pi  # rad: what is left of the loss's order six beside its mean is then small
 STANDSTILL = 1e-3  # of the speed at which the EMF takes the bus voltage
 
 
@@ -65,7 +65,7 @@ def block_points(recording, nominal, catalogue: dict | None = None) -> Stretches
     u, i, omega = view.to_dq(view.u[:, 1:-1]).mean(axis=1), view.i.mean(axis=1), view.omega.mean(axis=1)
     span = np.abs(view.theta[:, -1] - view.theta[:, 0])
     rest = np.where(span < AT_REST, view.theta[:, 0], np.nan)
-    turns = whole_turns(view.run, np.where(np.isfinite(rest), WHOLE_TURN, span))
+    turns = whole_turns(view.run, np.where(np.isfinite(rest), 2.0 * np.pi, span))
     i, u, omega, u_dc, temp, t = (
         np.array([np.mean(x[g]) for g in turns]) for x in (i, u, omega, view.u_dc.mean(axis=1), view.temp, view.t)
     )
@@ -84,7 +84,7 @@ def whole_turns(run, span) -> list[np.ndarray]:
         if run[n] != run[start]:
             start, covered = n, 0.0
         covered += span[n]
-        if covered >= WHOLE_TURN:
+        if covered >= 2.0 * np.pi * k.WHOLE_TURN:
             groups.append(np.arange(start, n + 1))
             start, covered = min(n + 1, len(run) - 1), 0.0
     return groups or [np.array([n]) for n in range(len(run))]
@@ -111,12 +111,12 @@ def _groups(t, signals, good, span) -> list[np.ndarray]:
     omega, nominal_u, u = signals
     limit = _limit(nominal_u, u, good)
     out, begin = [], None
-    for k in np.flatnonzero(good):
-        near = begin is not None and t[k] - t[begin] < span
-        near = near and abs(omega[k] - omega[begin]) <= SAME_SPEED * abs(omega[begin])
-        if near and max(abs(nominal_u[k] - nominal_u[begin]), abs(u[k] - u[begin])) < limit:
-            out[-1].append(k)
+    for n in np.flatnonzero(good):
+        near = begin is not None and t[n] - t[begin] < span
+        near = near and abs(omega[n] - omega[begin]) <= SAME_SPEED * abs(omega[begin])
+        if near and max(abs(nominal_u[n] - nominal_u[begin]), abs(u[n] - u[begin])) < limit:
+            out[-1].append(n)
         else:
-            out.append([k])
-            begin = k
+            out.append([n])
+            begin = n
     return [np.array(g) for g in out]

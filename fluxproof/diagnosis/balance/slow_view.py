@@ -21,6 +21,7 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.point_rows import block_points, point_rows
 from fluxproof.diagnosis.balance.slow_stretches import Stretches, stretches
+from fluxproof.diagnosis.balance.used import count_rows
 from fluxproof.diagnosis.balance.view import STACKED, View, lacking
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.arrays import Complex
@@ -119,7 +120,8 @@ def view_of_points(found: Stretches, recording, nominal, catalogue: dict | None 
     if alone(found, nominal):  # all that it can show is its drift
         found = found.averaged(MOST_OF_ONE)
     torque = np.full(len(found), np.nan) if found.torque is None else found.torque
-    order, dwell = alike(found, nominal)
+    steady, (order, dwell) = found.end - found.first, alike(found, nominal)
+    count_rows(recording, steady.sum(), steady[order].sum())
     b, period = len(order), nominal.sample_time_s
     span = 0.0 if "time" in recording.lacks else float(recording["t"][-1] - recording["t"][0])
     recording.meta.setdefault("notes", []).extend(found.notes)

@@ -9,26 +9,32 @@ formula, a tangent, the tangent of the ripple alone (a filter in front of the co
 the torque's ripple that a transducer does not show.
 
 At operating points there is no ripple.  A voltage that was measured through a filter is late as well, u / (1 + j omega
-tau), and smaller by half of (omega tau)^2: the loss is a curve beside the delay.
+tau), and smaller by half of (omega tau)^2: the loss is a curve beside the delay.  Or the angle is late, from an
+observer, a filter or an older message, so that all dq values are turned by omega tau.  Both follow omega^2 psi tau on
+the d axis, and load tells them apart; as forms of one cause neither takes what the other leaves.
 """
 
 import numpy as np
 
 from fluxproof.diagnosis.balance.curves import parabola
 from fluxproof.diagnosis.balance.late_pulses import instant, late_ripple
+from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.balance.shaft import SHOWN
 from fluxproof.diagnosis.effects import (
     DOUBT,
     Alternatives,
+    Caveat,
     FreeCurve,
     MeasurementError,
     Parameter,
+    angle_error,
     current_error,
     one,
     sigma,
     torque_of,
     voltage,
 )
+from fluxproof.diagnosis.ground import constants as k
 from fluxproof.plant.transforms import linear_limit
 
 MOST_PERIODS = 3.0  # periods; more than is possible, so that the iteration can return
@@ -36,7 +42,7 @@ TRIED, FINE = np.arange(1, 50) / 50, 0.002  # periods, of late pulses
 NEAR = 0.15  # periods between a delay and that of its ripple: about a zero vector
 STEP = 0.005  # periods on both sides of a delay, over which the slope of the ripple is taken
 RIPPLE = 0.1  # share by which the ripple may be wrong: a filter of the currents rounds it
-LATE = 0.5  # rad at the highest speed, of a voltage that a filter makes late
+LATE = 0.5  # rad at the highest speed, by which a filter makes a voltage or an angle late
 COUNT = "duty_applied_after_samples"
 TIMES = ("tau", "gates", "shift")  # coefficients whose sum is the delay
 
@@ -100,13 +106,13 @@ def _error(view, c):
     return c.get("gates", 0.0) * columns["gates"] + (c.get("shift", 0.0) + c.get("filter", 0.0)) * columns["shift"]
 
 
-class Delay(MeasurementError, FreeCurve, Alternatives):
-    one_of = (("tau", "loss"), ("gates", "shift", "filter", "torque"))
+class Delay(MeasurementError, FreeCurve, Alternatives, Caveat):
+    one_of = (("tau", "loss"), ("angle",), ("gates", "shift", "filter", "torque"))
 
     def core(self, view):
         late = -view.to_dq(_moved(view, 1.0)[:, 1:-1]) / view.sample_time_s
         if not view.locked.any():
-            return {"tau": voltage(late)}
+            return {"tau": voltage(late), "angle": angle_error(view, -view.omega)}
         return {"tau": voltage(late), "gates": self._pulses(view, late, "gates")}
 
     def free(self, view):
@@ -134,7 +140,7 @@ class Delay(MeasurementError, FreeCurve, Alternatives):
         return 2.5 * nominal.sample_time_s
 
     def size(self, c, nominal):
-        return abs(_time(c))
+        return max(abs(_time(c)), abs(c.get("angle", 0.0)))
 
     def too_large(self, c, view):
         """The ripple is that of another delay: its columns fit something else."""
@@ -143,7 +149,7 @@ class Delay(MeasurementError, FreeCurve, Alternatives):
         most = self.ceiling(view.nominal)
         if not view.locked.any():
             most = max(most, LATE / max(view.top_speed, 1e-9))
-        return bool(other) or abs(_time(c)) > most
+        return bool(other) or self.size(c, view.nominal) > most
 
     def possible(self, c, covariance, nominal):
         """A filter takes away amplitude and adds none."""
@@ -160,6 +166,8 @@ class Delay(MeasurementError, FreeCurve, Alternatives):
         return RIPPLE * np.sqrt(np.mean(np.abs(seen) ** 2, axis=1))
 
     def corrected(self, view, c):
+        if c.get("angle"):
+            return view.turned(-c["angle"] * view.omega)
         most = max(MOST_PERIODS, 0.0 if view.locked.any() else LATE / (view.top_speed * view.sample_time_s))
         late = float(np.clip(_time(c) / view.sample_time_s, -most, most))
         moved, error = view.replace(u=view.u + _moved(view, late)), _error(view, c)
@@ -177,19 +185,35 @@ class Delay(MeasurementError, FreeCurve, Alternatives):
         )
 
     def estimates(self, c, covariance, nominal):
+        if c.get("angle"):
+            return one("angle_late_s", "s", c["angle"], sigma(covariance, list(c).index("angle")))
         mine = [n for n, name in enumerate(c) if name in TIMES]
         return one("delay_s", "s", _time(c), np.sqrt(max(covariance[np.ix_(mine, mine)].sum(), 0.0)))
 
+    def caveat(self, view, c):
+        """At points with little load a late voltage and an early angle leave the same within twice the usual error."""
+        if view.locked.any():
+            return ""
+        late = c.get("angle", 0.0) + _time(c)
+        forms = ({"angle": late}, {"tau": late})
+        left, other = (misfit(self.corrected(view, form))["u"].mean(axis=1) for form in forms)
+        if np.mean(np.abs(left - other) ** 2) > (1.0 + k.FLOOR) * np.mean(np.square(view.balance_error())):
+            return ""
+        return "A late voltage and an early angle leave the same at these operating points: load tells them apart."
+
     def plant(self, c, nominal):
-        return {"timing.delay_s": _time(c)}
+        return {"timing.angle_delay_s": c["angle"]} if c.get("angle") else {"timing.delay_s": _time(c)}
 
 
 EFFECT = Delay(
     name="delay",
-    title="delay of the voltage",
-    equation="u(t) = u_recorded(t - tau)",
-    signature="order 0: the whole voltage vector rotated by omega tau; orders 3 and 6 of late gates",
+    title="delay of voltage or angle",
+    equation="u(t) = u_recorded(t - tau), or of an operating point theta_measured = theta(t - tau)",
+    signature="order 0: the voltage vector, or all of dq, rotated by omega tau; orders 3 and 6 of late gates",
     separated_by="two speeds, both directions; load at each; a step",
-    parameters=(Parameter("delay_s", "s", f"beyond {COUNT}", "later by", "recorded late by", COUNT),),
+    parameters=(
+        Parameter("delay_s", "s", f"beyond {COUNT}", "voltage later by", "voltage recorded late by", COUNT),
+        Parameter("angle_late_s", "s", "behind the currents", "angle late by", "angle early by"),
+    ),
     needs=("inverter",),
 )

@@ -8,6 +8,7 @@ from fluxproof.diagnosis.effects import LEAST_CURRENT, Constant, FluxEffect, Par
 
 class InductanceD(FluxEffect, Constant, Spread):
     rescales = ("inductance_d_h",)
+    bent = "saturation"
 
     def core_psi(self, view):
         return {"delta_l_d": view.i.real.astype(complex)}

@@ -8,6 +8,7 @@ from fluxproof.diagnosis.effects import LEAST_CURRENT, Constant, FluxEffect, Par
 
 class InductanceQ(FluxEffect, Constant, Spread):
     rescales = ("inductance_q_h",)
+    bent = "saturation"
 
     def core_psi(self, view):
         return {"delta_l_q": 1j * view.i.imag}

@@ -3,8 +3,8 @@
 
 Currents that are sampled tau after the middle of the zero vector have the slope that the EMF gives them, and the ripple
 of the pulses.  An angle that is late by tau, from an observer, a filter or an older message, turns all dq values by
-omega tau.  At operating points, where both follow omega^2 psi tau as a late voltage does, it is not among the effects:
-beside the delay it led the search of a real saturating machine to a wrong scale of the currents.
+omega tau.  At operating points, where a late angle follows omega^2 psi tau as a late voltage does, both are forms of
+the delay: side by side they led the search of a real saturating machine to a wrong scale of the currents.
 """
 
 import numpy as np

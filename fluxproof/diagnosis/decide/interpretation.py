@@ -31,10 +31,11 @@ def is_simpler(readings, left, most, absurd) -> bool:
     """Whether the interpretations, and the effects ``left`` beside them, are no more than ``most`` effects without.
 
     Other pole pairs scale L_d, L_q and psi: instead of one effect of a plausible size they would be chance; absurd:
-    whether the effects without an interpretation have sizes outside of what is plausible.
+    whether the effects without an interpretation have sizes outside of what is plausible.  Two factors that are met
+    exactly are one constant that is off: voltages and R, L at twice are a magnet flux at half, which is one mistake.
     """
     cost = sum(1 + bool(r.pole_pairs and not absurd) for r in readings)
-    return len(left) + cost <= most or (not left and cost == len(readings))
+    return len(left) + cost <= most or (absurd and not left)
 
 
 def under(readings, rivals, documented: Decision, found: Decision, level: float) -> Decision:

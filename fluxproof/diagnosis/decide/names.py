@@ -15,6 +15,7 @@ import numpy as np
 
 from fluxproof.diagnosis.balance.shaft import measures_torque
 from fluxproof.diagnosis.decide.ambiguity import ambiguities
+from fluxproof.diagnosis.decide.bent import bent_groups
 from fluxproof.diagnosis.decide.credibility import credibilities
 from fluxproof.diagnosis.decide.estimates import estimates_in
 from fluxproof.diagnosis.decide.sized import has_size
@@ -73,6 +74,7 @@ def names_of(posterior) -> Names:
     twins = [n for n in named if _has_a_twin(n, effects, groups)]
     if twins and not measures_torque(posterior.setup.view):  # which a wrong current changes, and a wrong nameplate not
         groups += tuple(_with_its_twin(n, effects[n], best.c[n]) for n in twins)
+    groups += bent_groups([n for n in named if not any(n in g for g in groups)], best, effects)
     same = {n for n, e in effects.items() if isinstance(e, Constant) and e.rescales in TORQUE_PER_AMPERE}
     if same & {*named, *itertools.chain(*groups)} and not posterior.setup.view.has_voltage.any():
         groups = _with_the_same_torque(groups, same)

@@ -2,7 +2,8 @@
 """The rules by which a posterior becomes a verdict with names, in the order in which they apply.
 
     1. held_out.py      what worsens the prediction at points that were not fitted is rejected
-    2. names.py         what is probable is named, rivals are ambiguous (ambiguity.py)
+    2. names.py         what is probable is named, rivals are ambiguous (ambiguity.py); where the misfit is more than a
+                        recording of this kind has, there is a cause, so that "none" is no alternative
     3. off_orders.py    a misfit outside the orders of the balance is looked for
     4. _as_noise        nothing is asserted where recording and simulation agree
     5. relevant.py      what is too small to act on is no cause
@@ -58,6 +59,7 @@ def judge(posterior, held) -> Judgement:
     """The judgement on a posterior; held: (b,) blocks that were not fitted."""
     setup, searched = posterior.setup, posterior
     posterior = setup.call(without_idle, posterior, held)
+    posterior = replace(posterior, agrees=is_usual(_sizes(posterior.best(), set(), ~held)))
     names, best = setup.call(names_of, posterior), posterior.best()
     stray = setup.call(_off_orders, posterior, frozenset(names.suspects), held)
     names = relevant_names(_as_noise(posterior, names, stray, held), best)

@@ -15,6 +15,7 @@ class Constant(Effect):
 
     rescales: tuple[str, ...] = ()  # signals and [machine] keys that it scales or offsets: i, u, u_dc, theta_e, ...
     exact: bool = True  # its formula cannot be wrong: no error of a formula is assumed
+    bent: str = ""  # the effect that it is where it changes with the current
 
     def often(self, nominal):
         return OFTEN * getattr(nominal.machine, self.rescales[0]) if is_of_nameplate(self) else None

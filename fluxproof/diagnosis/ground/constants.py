@@ -112,6 +112,9 @@ REGION = 1.5
 # Distance, in control periods and in standard deviations, within which a time counts as a whole number of periods, as
 # a wrong register of the timing makes it.
 WHOLE_PERIOD, WHOLE_SIGMAS = 0.01, 3.0
+# Difference from the recorded voltage in the closed loop, relative to that with the nominal drive, from which an
+# improved drive file is not written.
+MUCH_WORSE = 1.1
 # Share of an effect's longest column below which the recording does not show a coefficient, so that one is requested.
 SHOWN = 0.06
 
@@ -137,6 +140,9 @@ SLOW_LEAST = 0.2
 # Largest noise relative to the voltage that is estimated from the residual, where operating points repeat too seldom to
 # show it; a larger residual is not noise.
 UNREPEATED = 0.03
+
+# Angle that a mean over blocks covers, turns: what is then left of order six of the inverter's loss is small.
+WHOLE_TURN = 0.95
 
 # ---- one operating point
 # Largest reduced chi^2 of an accepted drift; residual rms relative to the misfit that the shapes of curves may cause;

@@ -96,10 +96,13 @@ def log_too_small(fit: FittedSet, names) -> float:
     return k.SMALLER * sum(min(float(np.log(size)), 0.0) for size in sizes)
 
 
-def possible(fit: FittedSet) -> bool:
-    """Whether no effect of a set has an impossible size or, beyond its uncertainty, an impossible sign."""
+def possible(fit: FittedSet, names=None) -> bool:
+    """Whether no effect of a set has an impossible size or, beyond its uncertainty, an impossible sign.
+
+    names: the effects that are asked for; None: all of the set.
+    """
     problem = fit.problem
-    for name in fit.names:
+    for name in fit.names if names is None else names:
         effect, c = problem.setup.effects[name], fit.c[name]
         if effect.too_large(c, problem.setup.view):
             return False

@@ -16,21 +16,24 @@ from fluxproof.diagnosis.inference.setup import Setup
 class Posterior:
     """All sets that were judged, the best linearisation of each.
 
-    idle: {effect: why it was taken out}; around: sets of measurement errors around whose best set others were judged.
+    idle: {effect: why it was taken out}; around: sets of measurement errors around whose best set others were judged;
+    agrees: whether the misfit may be no more than a recording of this kind has, so that there may be no cause.
     """
 
     setup: Setup
     fits: Mapping[tuple[str, ...], FittedSet]
     idle: Mapping[str, str] = field(default_factory=dict)
     around: frozenset[frozenset[str]] = frozenset()
+    agrees: bool = True
 
     def best(self) -> FittedSet:
         """The most probable set."""
         return max(self.fits.values(), key=lambda f: f.value)
 
     def weights(self) -> list[tuple[float, FittedSet]]:
-        """[(probability, set)] of all sets, the most probable first."""
-        fits = sorted(self.fits.values(), key=lambda f: -f.value)
+        """[(probability, set)] of all sets, the most probable first; where there is a cause, of those with one."""
+        fits = [f for f in self.fits.values() if f.names or self.agrees] or list(self.fits.values())
+        fits = sorted(fits, key=lambda f: -f.value)
         w = np.exp(np.array([f.value for f in fits]) - fits[0].value)
         return list(zip(w / w.sum(), fits, strict=True))
 

@@ -19,7 +19,7 @@ from fluxproof.diagnosis.effects.free_curve import alternatives
 from fluxproof.diagnosis.effects.search import log_choice
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
-from fluxproof.diagnosis.inference.fitted_set import FittedSet, implausible, log_too_small
+from fluxproof.diagnosis.inference.fitted_set import FittedSet, implausible, log_too_small, possible
 from fluxproof.diagnosis.inference.linearise import Linearisation
 from fluxproof.diagnosis.inference.model import Columns
 from fluxproof.diagnosis.inference.points import condense
@@ -97,16 +97,13 @@ class Problem:
         """
         ways = itertools.product(*(self._ways(name) for name in names))
         found = [self._likelihood(names, sum(way, [])) for way in ways]
-        return found[0] if len(found) == 1 else max(found, key=lambda f: (not self._too_large(f), f[1]))
+        return found[0] if len(found) == 1 else max(found, key=lambda f: (self._is_possible(names, f), f[1]))
 
-    def _too_large(self, found) -> bool:
-        """Whether a result of ``_likelihood`` has an impossible effect, of those whose forms exclude each other."""
-        c = {}
-        for n, value in zip(found[0], found[2], strict=True):
-            name, key = self.keys[n]
-            c.setdefault(name, {})[key] = float(value)
-        chosen = {name: self.setup.effects[name] for name in c if isinstance(self.setup.effects[name], Alternatives)}
-        return any(effect.too_large(c[name], self.setup.view) for name, effect in chosen.items())
+    def _is_possible(self, names, found) -> bool:
+        """Whether a result of ``_likelihood`` has no impossible effect, of those whose forms exclude each other."""
+        take, value, *rest = found
+        fit = FittedSet(self, names, value, take, *rest)
+        return possible(fit, [n for n in names if isinstance(self.setup.effects[n], Alternatives)])
 
     def _ways(self, name) -> list[list[int]]:
         """The columns of an effect, once with each group of those that exclude each other."""

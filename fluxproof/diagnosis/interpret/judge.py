@@ -81,6 +81,10 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
             continue
         progress(f"interpretation: {j.readings[0].says}")
         read = setup.call(_read, setup, tuple(r.code for r in j.readings))
+        if not is_simpler(j.readings, ("any",), most, absurd):  # no effect may be left beside it
+            alone = Problem(read).fit(()).value + prior + terms.jacobian(j.readings)
+            if alone <= known:
+                continue
         other = setup.call(search, read, progress)
         value = other.best().value + prior + terms.jacobian(j.readings)
         left = other.best().names

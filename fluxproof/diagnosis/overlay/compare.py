@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.nominal import Nominal, load_nominal
 from fluxproof.diagnosis.ground.plant_section import Plant, errors_beyond, plant_of
 from fluxproof.diagnosis.ground.recording import Recording, RecordingError
@@ -24,7 +25,6 @@ from golden_model.scaling import current_gains
 MOST_POINTS = 4_000
 SIGNALS = ("u_d_ref", "u_q_ref", "i_d", "i_q")
 VOLTAGES = SIGNALS[:2]
-MUCH_WORSE = 1.1  # times the difference with the nominal drive
 RUN_IN = 200  # rows at the start of a stretch that are simulated but not shown
 USUAL_BANDWIDTH = 0.05  # of the sampling frequency, if the drive file gives no bandwidth
 
@@ -67,7 +67,7 @@ def is_worse(laid_over: dict | None, fit) -> bool:
     if laid_over is None or "rms_after" not in laid_over or fit is None:
         return False
     before, after = (np.hypot(*(laid_over[f"rms_{when}"][x] for x in VOLTAGES)) for when in ("before", "after"))
-    return bool(after > MUCH_WORSE * before + fit.noise_floor)
+    return bool(after > k.MUCH_WORSE * before + fit.noise_floor)
 
 
 def _shown(parts: list[Stretch], slow: bool):
@@ -86,7 +86,7 @@ def _blocks(pieces, block):
 
 def _columns(pieces, block) -> dict:
     """{signal: block means} of pieces (n, 4)."""
-    return {name: _blocks([p[:, k] for p in pieces], block) for k, name in enumerate(SIGNALS)}
+    return {name: _blocks([p[:, n] for p in pieces], block) for n, name in enumerate(SIGNALS)}
 
 
 def _recorded(recording: Recording, nominal: Nominal) -> np.ndarray:

@@ -14,6 +14,7 @@ TOLD = (
     "late",
     "lost_rows",
     "torque_lost",
+    "little_used",
 )  # codes of findings without which the figures cannot be read
 UNUSED = "rows not used"
 

@@ -139,12 +139,35 @@ def _named(answer, effects, brackets=False) -> list[str]:
 def _sets(answer, effects) -> list[str]:
     """The ambiguities: all members with the sizes of each alone, all, the first two of each, and their number."""
     alone = {e.name: said(e, effects, 1, brackets=True) for e in answer.alternatives}
-    sized = [[alone.get(n, title_of(n, effects)) for n in group] for group in answer.ambiguity]
-    titles = [[title_of(n, effects) for n in group] for group in answer.ambiguity]
+    parts = [_open_and_certain(group, answer) for group in answer.ambiguity]
+    sized = [[alone.get(n, title_of(n, effects)) for n in group] for group, _ in parts]
+    titles = [[title_of(n, effects) for n in group] for group, _ in parts]
     short = [t if len(t) < 4 else [*t[:2], f"{len(t) - 2} other effects"] for t in titles]
-    texts = ["; and ".join(joined(t) for t in each) for each in (sized, titles, short)]
+    depend = [_depends([title_of(n, effects) for n in certain]) for _, certain in parts]
+    few = [_depends([title_of(certain[0], effects), f"{len(certain) - 1} more"]) if len(certain) > 1 else d
+           for (_, certain), d in zip(parts, depend, strict=True)]  # fmt: skip
+    lengths = ((sized, depend), (titles, depend), (titles, few), (short, few))
+    texts = ["; and ".join(joined(t) + d for t, d in zip(*each, strict=True)) for each in lengths]
     others = sum(map(len, titles)) - 1
     return [*texts, f"{titles[0][0]} and {others} other effect{'s' if others > 1 else ''}" if titles else ""]
+
+
+def _open_and_certain(group, answer) -> tuple[list[str], list[str]]:
+    """The members of an ambiguity of which one is there, and those that are there whichever it is, with another size.
+
+    Of a saturating machine eleven effects were told as not separable, two of which were certain.
+    """
+    sure = {e.name for e in answer.alternatives if e.confidence >= 1.0 - k.DOUBTED}
+    left = [n for n in group if n not in sure]
+    # What no balance tells from its twin is certain only as one of the two.
+    return (left, [n for n in group if n in sure]) if len(left) > 1 else (list(group), [])
+
+
+def _depends(certain) -> str:
+    """That the sizes of what is certain depend on which of an ambiguity is there; "" if nothing is."""
+    if not certain:
+        return ""
+    return f", on which the size of {joined(certain)} depends"
 
 
 def _cause(answer) -> list[str]:
