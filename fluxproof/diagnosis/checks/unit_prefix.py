@@ -18,7 +18,6 @@ from fluxproof.diagnosis.ground.recording import Problem
 STAGE = "channels"
 VANISHING = 1e-12  # times the currents: none, and still the same rows with the largest ones
 NAMES = ("i_a", "i_b", "i_c", "i_d", "i_q")
-LOADED = 0.02  # of rated current: with less at most, any balance is met that has wrong inductances
 
 
 def check(recording, nominal) -> None:
@@ -33,8 +32,7 @@ def check(recording, nominal) -> None:
         return
     name, machine = names[0], nominal.machine
     reaches = max(float(np.nanmax(np.abs(recording[n]))) for n in names)
-    able = [factor for factor in PREFIXES if factor * reaches > LOADED * machine.rated_current_a]
-    tried = {factor: misfit(_scaled(rows, factor), at_current=True) for factor in able} or {1.0: as_is}
+    tried = {factor: misfit(_scaled(rows, factor), at_current=True) for factor in PREFIXES}
     best = min(tried, key=tried.__getitem__)
     without = misfit(_scaled(rows, VANISHING), at_current=True)
     if tried[best] > min(BETTER * as_is, BETTER * without, FIT):
