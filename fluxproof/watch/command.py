@@ -67,7 +67,9 @@ def run(args: argparse.Namespace) -> int:
         source = source_of(args.source)
     sinks = [Csv(args.csv, drive)] if args.csv else []
     sinks += [PlotJuggler(args.plotjuggler, drive)] if args.plotjuggler else []
-    live = Live(source, rows, LiveReplay(register_set), sinks)
+    replay = LiveReplay(register_set)
+    replay.compile()
+    live = Live(source, rows, replay, sinks)
     explainer = Explainer(live, drive, args.drive, register_set, args.every) if args.every > 0 else None
     threads = [threading.Thread(target=live.run)]
     if explainer is not None:
