@@ -13,6 +13,7 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 from urllib.request import urlopen
 
 import numpy as np
@@ -25,19 +26,23 @@ from fluxproof.checkout import DRIVES, ROOT
 from fluxproof.command import main
 from fluxproof.commission.session import Step
 from fluxproof.commission.simulated import SimulatedBus, board_of
-from fluxproof.cosim.scenarios import everything
+from fluxproof.cosim import golden_loop
+from fluxproof.cosim.scenarios import everything, scenario
 from fluxproof.diagnosis.example import motor
 from fluxproof.diagnosis.replay.capture import capture, packets
 from fluxproof.diagnosis.replay.telemetry import MAGIC
 from fluxproof.diagnosis.replay.telemetry_stream import values
-from fluxproof.plant import IMPOSED_SPEED
+from fluxproof.plant import IMPOSED_SPEED, Machine
+from fluxproof.simulate.response import LOOPS, length
+from fluxproof.simulate.run import inverter_of
 from fluxproof.watch.commissioning import Page, Story, Watched
 from fluxproof.watch.curves import thinned
 from fluxproof.watch.explain import Explainer, Explanation
-from fluxproof.watch.live import Live
+from fluxproof.watch.live import Live, Look
 from fluxproof.watch.packets import Packets
 from fluxproof.watch.page import Scene, state_of, view
 from fluxproof.watch.replay import LiveReplay
+from fluxproof.watch.responses import Responses, steps_in
 from fluxproof.watch.server import allowed, serve, token_for
 from fluxproof.watch.sinks import PlotJuggler
 from fluxproof.watch.source import Tcp, source_of
@@ -46,6 +51,7 @@ from golden_model.drive_keys import DriveError
 from golden_model.estimators.flux_monitor import CONDITIONS, FAULTS
 from golden_model.io.telemetry_words import COUNT, LAYOUT
 from golden_model.registers import registers
+from golden_model.units import from_si
 from studies.live import browser
 from studies.live.browser import TEXT
 
@@ -334,6 +340,59 @@ def test_token(words):
             session.close()
     assert token_for("127.0.0.1") is None and len(token_for("0.0.0.0")) >= 20
     assert not allowed("a", {}) and allowed(None, {})
+
+
+def running(inertia: float) -> Live:
+    """A speed step and a step of i_q of the paper's drive, whose inertia is that of the file times ``inertia``."""
+    steps = {"rpm": {0.0: 183, 0.2: 732}, "i_q": {0.50: 1.5}, "torque_mode": ((0.45, 0.55),)}
+    given = scenario(DRIVE, 0.55, load={0.05: 1.0}, **steps)
+    machine = Machine.from_mapping(vars(DRIVE.machine))
+    machine = replace(machine, inertia_kgm2=inertia * machine.inertia_kgm2)
+    options = {"dead_time_s": DRIVE.inverter.dead_time_s, "inverter": inverter_of(DRIVE)}
+    seen = golden_loop.simulate(DRIVE, SET, given, machine, **options).observed
+    fields = {name: getattr(given, name) for name in ("omega_ref", "i_d_ref", "i_q_ext", "speed_mode")}
+    fields |= {"run": given.enable, **{name: seen[name] for name in ("i_q", "theta_me", "omega_me", "u_dc")}}
+    live = watched(capacity=10)
+    live.total = len(given)
+    live.look = lambda count, names: Look(np.arange(len(given)), fields, np.zeros(0, np.int64))
+    return live
+
+
+@pytest.mark.parametrize("inertia", [1.0, 2.0])
+def test_a_step_is_cut_out_and_stands_beside_its_prediction(inertia):
+    """Equal where the drive is that of the file; a larger inertia is seen in the speed's response alone."""
+    responses = Responses(running(inertia), DRIVE, SET)
+    responses.renew()
+    assert {name: r.counter for name, r in responses.latest.items()} == {"current loop": 5000, "speed loop": 2000}
+    for name, response in responses.latest.items():
+        apart = np.abs(response.measured.values[20:] - response.predicted.values).max()
+        rise, told = (float(row[1].split()[0]) for row in response.told())
+        if inertia == 1.0 or name == "current loop":
+            assert apart < 0.06 * (response.after - response.before), name
+        else:
+            assert rise > 1.3 * told
+    before = dict(responses.latest)
+    responses.renew(lambda *_: pytest.fail("a step that is known is predicted again"))
+    assert responses.latest == before
+
+
+def test_a_step_counts_only_at_rest_and_until_the_loop_has_settled():
+    """Not within a gap, not before the speed of the step before has come, not where another reference moves."""
+    drive, loop = DRIVE, LOOPS[1]
+    n, size = 9000, int(from_si("omega_ref", 100.0, DRIVE))
+    quiet = {name: np.zeros(n, np.int64) for name in ("i_d_ref", "i_q_ext", "i_q", "u_dc")}
+    fields = quiet | {name: np.ones(n, np.int64) for name in ("run", "speed_mode")}
+    fields["omega_ref"] = np.where(np.arange(n) < 3000, 0, size)
+    fields["omega_me"] = fields["omega_ref"].copy()
+    rows = lambda cuts=(), **others: steps_in(  # noqa: E731
+        Look(np.arange(n), fields | others, np.array(cuts, np.int64)), drive, loop
+    )
+    behind = 3000 + length(drive, loop, 100.0)
+    assert rows() == [(3000, behind)]
+    assert rows((3500,)) == [] and rows((2990,)) == [] and rows((behind,)) == [(3000, behind)]
+    assert rows(omega_me=fields["omega_me"] + size // 4) == []
+    assert rows(i_d_ref=(np.arange(n) > 3100).astype(int)) == []
+    assert rows(speed_mode=quiet["i_q"]) == [] and rows(run=quiet["i_q"]) == []
 
 
 def test_flags_in_words(words):

@@ -14,9 +14,11 @@ from bokeh.layouts import column, row
 from bokeh.models import Button, ColumnDataSource, CustomJS, Div, Select, Toggle
 from bokeh.plotting import figure
 
+from fluxproof.watch.answers import Answers
 from fluxproof.watch.curves import COLOURS, PICTURE_MS, POINTS, WIDE, plot, thinned
 from fluxproof.watch.explain import Explainer
 from fluxproof.watch.live import Live, Look
+from fluxproof.watch.responses import Responses
 from fluxproof.watch.sinks import scales_of, table
 from golden_model.drive import Drive
 from golden_model.estimators.flux_monitor import CONDITIONS
@@ -34,6 +36,7 @@ class Scene(NamedTuple):
     live: Live
     drive: Drive
     explainer: Explainer | None
+    responses: Responses | None = None
 
 
 def curves(look: Look, drive: Drive) -> dict[str, np.ndarray]:
@@ -81,7 +84,8 @@ def view(doc: Any, scene: Scene) -> None:
     sources["limit"] = ColumnDataSource({"x": [], "y": []})
     circle.line("x", "y", source=sources["limit"], color="#000000", name="limit")
     circle.scatter("x", "y", source=sources["voltage"], size=2, color="#d55e00", name="voltage")
-    said, digital, why, flags = (Div(width=WIDE - 10) for _ in range(4))
+    said, digital, why, flags, answers = (Div(width=WIDE - 10) for _ in range(5))
+    answered = Answers(drive)
     window = Select(title="Window [s]", value="1", options=list(WINDOWS_S), name="window", width=80)
     hold = Toggle(label="Hold", name="hold")
     trigger = Toggle(label="Hold when the gates go off", name="trigger")
@@ -96,6 +100,8 @@ def view(doc: Any, scene: Scene) -> None:
     def renew() -> None:
         said.text, digital.text = escape(live.told()), f"<b>{escape(live.replay.told())}</b>"
         why.text = _explained(scene.explainer)
+        if scene.responses is not None:
+            answers.text = escape(scene.responses.problem) or answered.renew(scene.responses.latest)
         if hold.active or live.total < 2:
             return
         look = live.look(rows())
@@ -118,8 +124,9 @@ def view(doc: Any, scene: Scene) -> None:
         doc.add_next_tick_callback(save)
 
     export.on_click(ask_save)
-    controls = column(row(window, hold, trigger), export, digital, said, flags, why, circle, width=WIDE)
-    doc.add_root(row(column(*plots, sizing_mode="stretch_width"), controls, sizing_mode="stretch_width"))
+    controls = column(row(window, hold, trigger), export, digital, said, flags, why, answers, circle, width=WIDE)
+    left = column(*plots, row(*answered.plots.values(), sizing_mode="stretch_width"), sizing_mode="stretch_width")
+    doc.add_root(row(left, controls, sizing_mode="stretch_width"))
     doc.add_root(carried_root(carried))
     doc.add_periodic_callback(renew, PICTURE_MS)
 
