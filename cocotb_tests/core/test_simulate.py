@@ -59,7 +59,7 @@ def edited(tmp_path, **changes):
 def test_the_trims_of_a_commissioned_file_are_those_of_its_sensors():
     """Encoder and converters mounted as the file says: the step is that of a file without trims."""
     plain = simulated_run(DRIVE, registers(DRIVE), scene.current_step(DRIVE))
-    trims = {"theta_offset_rad": 2.0, "position_reverse": True, "current_offset_code": (2100.0, 2000.0, 2048.0)}
+    trims = {"theta_offset_rad": 2.0, "position_reverse": True, "current_offset_code": (33000.0, 32000.0, 32768.0)}
     drive = changed("sensors", **trims, current_gain=(1.1, 0.9, 1.0), u_dc_offset_code=20.0, u_dc_gain=1.05)
     told = simulated_run(drive, registers(drive), scene.current_step(drive))
     for name, within in (("i_q", 0.05), ("i_d", 0.05), ("u_max", 0.5)):
