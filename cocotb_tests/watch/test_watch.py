@@ -24,17 +24,20 @@ from bokeh.client import pull_session
 from cocotb_tests.support.drives import PAPER
 from fluxproof.checkout import DRIVES, ROOT
 from fluxproof.command import main
-from fluxproof.commission.session import Step
-from fluxproof.commission.simulated import SimulatedBus, board_of
+from fluxproof.commission.responses import step_responses
+from fluxproof.commission.session import Session, Step
+from fluxproof.commission.simulated import Board, SimulatedBus, board_of
 from fluxproof.cosim import golden_loop
 from fluxproof.cosim.scenarios import everything, scenario
+from fluxproof.cosim.step_response import LOOPS
 from fluxproof.diagnosis.example import motor
 from fluxproof.diagnosis.replay.capture import capture, packets
 from fluxproof.diagnosis.replay.telemetry import MAGIC
 from fluxproof.diagnosis.replay.telemetry_stream import values
 from fluxproof.plant import IMPOSED_SPEED, Machine
-from fluxproof.simulate.response import LOOPS, length
+from fluxproof.simulate.response import length
 from fluxproof.simulate.run import inverter_of
+from fluxproof.watch.answers import told
 from fluxproof.watch.commissioning import Page, Story, Watched
 from fluxproof.watch.curves import thinned
 from fluxproof.watch.explain import Explainer, Explanation
@@ -351,7 +354,7 @@ def running(inertia: float) -> Live:
     options = {"dead_time_s": DRIVE.inverter.dead_time_s, "inverter": inverter_of(DRIVE)}
     seen = golden_loop.simulate(DRIVE, SET, given, machine, **options).observed
     fields = {name: getattr(given, name) for name in ("omega_ref", "i_d_ref", "i_q_ext", "speed_mode")}
-    fields |= {"run": given.enable, **{name: seen[name] for name in ("i_q", "theta_me", "omega_me", "u_dc")}}
+    fields |= {"run": given.enable, **{name: seen[name] for name in ("i_q", "theta_me", "omega_me", "u_dc", "v_comp")}}
     live = watched(capacity=10)
     live.total = len(given)
     live.look = lambda count, names: Look(np.arange(len(given)), fields, np.zeros(0, np.int64))
@@ -446,6 +449,23 @@ def test_what_the_page_of_a_commissioning_tells():
     assert page.left_out == 1 and page.messages.qsize() == 2
     kind, (_, integers) = page.messages.get()
     assert kind == "row" and integers[0] == rows[0]["i_d"] and integers[-1] == rows[0]["theta_me"]
+
+
+def test_step_responses_of_a_commissioning_stand_beside_their_predictions():
+    """The drive is that of the file: rise and overshoot of both loops are those of the prediction."""
+    drive = replace(DRIVE, inverter=replace(DRIVE.inverter, dead_time_s=0.0))  # with one, the rotor's angle counts
+    bus, story = SimulatedBus(drive, Board(Machine.from_mapping(vars(drive.machine)))), Story()
+    step = step_responses(Session(bus, drive), drive)
+    assert bus.read("enable") == 0 and not step.notes and [at.loop for _, at, _ in step.responses] == list(LOOPS)
+    story.predict(step)
+    for response in story.latest.values():
+        assert len(response.measured.time) > 50
+        expected = np.interp(response.measured.time, *response.predicted)
+        apart = np.abs(expected - response.measured.values).max()
+        assert apart < 0.06 * (response.after - response.before), response.told()
+    at = step.responses[0][1]
+    assert f"{at.loop.name} 0 to {at.after:.4g} A in " in step.said and "speed loop" in step.said
+    assert told(story.latest).count("predicted") == 2
 
 
 @pytest.mark.slow

@@ -12,9 +12,9 @@ import math
 import numpy as np
 
 from fluxproof.cosim.scenarios import RPM
+from fluxproof.cosim.step_response import rise_and_overshoot
 from fluxproof.simulate import scene as scenes
 from fluxproof.simulate.regeneration import Regeneration
-from fluxproof.simulate.response import rise_and_overshoot
 from fluxproof.simulate.run import Run
 from fluxproof.simulate.scene import TAIL, Stage
 from golden_model import supply

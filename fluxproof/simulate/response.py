@@ -9,11 +9,12 @@ load that the current before the step stands for:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from fluxproof.cosim.driven_plant import Scenario
+from fluxproof.cosim.step_response import LOOPS, Loop, Situation
 from fluxproof.simulate.run import run
 from fluxproof.simulate.scene import SETTLE, STEP_SAMPLES, Scene, Stage, crossover, torque_per_a
 from golden_model.drive import Drive
@@ -24,48 +25,11 @@ from golden_model.units import from_si
 MOST_SAMPLES = 100_000  # before or after a step: some seconds of computing
 
 
-@dataclass(frozen=True)
-class Loop:
-    """``reference`` is the input that steps in ``speed_mode``, ``signal`` what follows it."""
-
-    name: str
-    reference: str
-    signal: str
-    speed_mode: int
-
-
-LOOPS = Loop("current loop", "i_q_ext", "i_q", 0), Loop("speed loop", "omega_ref", "omega_me", 1)
-
-
-@dataclass(frozen=True)
-class Situation:
-    """A step from ``before`` to ``after`` [A or electrical rad/s] and what it was made at.
-
-    ``omega``: the shaft's speed [electrical rad/s] at each sample from the step on; its length is that of the response.
-    """
-
-    loop: Loop
-    before: float
-    after: float
-    omega: np.ndarray
-    i_d: float  # A, of the reference
-    i_q: float  # A, before the step
-    u_dc: float  # V
-    theta: float = 0.0  # electrical rad, at the step: the inverter's loss depends on it
-
-
 def loops_of(drive: Drive) -> tuple[Loop, ...]:
     """The loops that can be predicted: the speed loop where the file has its gain, a flux and an inertia."""
     m = drive.machine
     known = m.inertia_kgm2 > 0.0 and m.magnet_flux_wb > 0.0 and speed_gains(drive)[0] > 0.0
     return LOOPS if known else LOOPS[:1]
-
-
-def rise_and_overshoot(curve: np.ndarray, before: float, after: float) -> tuple[int | None, float]:
-    """(first sample at 90 % of the step or None, the largest value beyond its end as a share of the step)."""
-    made = (curve - before) / (after - before)
-    reached = np.flatnonzero(made >= 0.9)
-    return int(reached[0]) if len(reached) else None, max(float(made.max()) - 1.0, 0.0)
 
 
 def length(drive: Drive, loop: Loop, change: float) -> int:
@@ -109,6 +73,10 @@ def predicted(drive: Drive, register_set: RegisterSet, at: Situation) -> np.ndar
         theta_m=float(at.theta / pairs - before * first * drive.sample_time_s),
     )
     stages = Stage("before", 0, first, at.before), Stage("step", first, first + n, at.after)
+    changes = {"v_start": at.v_comp}
+    if drive.encoder.kind != "hall":  # the board gives the speed of Hall sensors alone to a simulated core
+        changes["speed_given"] = 0
+    register_set = register_set._replace(values=register_set.values._replace(**changes))
     ideal = replace(drive, supply=replace(drive.supply, source="ideal"))
     done = run(ideal, register_set, Scene(scenario, stages, imposed=not speed))
     return done[at.loop.signal][first:]

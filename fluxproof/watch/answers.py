@@ -9,7 +9,7 @@ import numpy as np
 from bokeh.models import ColumnDataSource
 from bokeh.plotting import figure
 
-from fluxproof.simulate.response import LOOPS, Loop
+from fluxproof.cosim.step_response import LOOPS, Loop
 from fluxproof.watch.curves import thinned
 from fluxproof.watch.responses import Response
 from golden_model.drive import Drive

@@ -18,7 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fluxproof.simulate.response import Loop, Situation, length, loops_of, predicted, rise_and_overshoot
+from fluxproof.cosim.step_response import Curve, Loop, Situation, told
+from fluxproof.simulate.response import length, loops_of, predicted
 from fluxproof.watch.live import Live, Look
 from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError
@@ -33,14 +34,7 @@ SMALLEST, AT_REST = (
 )  # a step, of the current limit or the rated speed; what is left of the last one, of a step
 FIXED = ("omega_ref", "i_d_ref", "i_q_ext", "speed_mode", "run")
 Predict = Callable[[Drive, RegisterSet, Situation], np.ndarray]
-NEEDED = (*FIXED, "i_q", "theta_me", "omega_me", "u_dc")
-
-
-class Curve(NamedTuple):
-    """Values [A or electrical rad/s] at times [s] from the step on."""
-
-    time: np.ndarray
-    values: np.ndarray
+NEEDED = (*FIXED, "i_q", "theta_me", "omega_me", "u_dc", "v_comp")
 
 
 class Response(NamedTuple):
@@ -55,13 +49,8 @@ class Response(NamedTuple):
 
     def told(self) -> list[tuple[str, str, str]]:
         """(response, rise to 90 %, overshoot) of both."""
-        rows = []
-        for name, curve in (("measured", self.measured), ("predicted", self.predicted)):
-            begin = int(np.searchsorted(curve.time, 0.0))
-            reached, over = rise_and_overshoot(curve.values[begin:], self.before, self.after)
-            rise = "not reached" if reached is None else f"{1e3 * curve.time[begin + reached]:.3g} ms"
-            rows.append((name, rise, f"{100.0 * over:.1f} %"))
-        return rows
+        curves = (("measured", self.measured), ("predicted", self.predicted))
+        return [(name, *told(curve, self.before, self.after)) for name, curve in curves]
 
 
 def smallest(drive: Drive, loop: Loop) -> float:
@@ -108,6 +97,7 @@ def situation(look: Look, drive: Drive, loop: Loop, row: int, behind: int) -> Si
         i_q=float(si["i_q"][before].mean()),
         u_dc=float(si["u_dc"][before].mean()),
         theta=float(si["theta_me"][row]),
+        v_comp=int(look.fields["v_comp"][row - 1]),
     )
 
 
@@ -148,13 +138,13 @@ class Responses:
     def _response(self, look: Look, loop: Loop, row: int, behind: int, predict: Predict) -> Response:
         at, period_s = situation(look, self.drive, loop, row, behind), self.drive.sample_time_s
         seen = to_si(loop.signal, look.fields[loop.signal][row - BEFORE : behind], self.drive)
-        told = predict(self.drive, self.register_set, at)
+        expected = predict(self.drive, self.register_set, at)
         return Response(
             loop,
             at.before,
             at.after,
             Curve((np.arange(len(seen)) - BEFORE) * period_s, seen),
-            Curve(np.arange(len(told)) * period_s, told),
+            Curve(np.arange(len(expected)) * period_s, expected),
             int(look.counter[row]),
         )
 
