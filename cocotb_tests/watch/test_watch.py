@@ -42,7 +42,7 @@ from fluxproof.watch.commissioning import Page, Story, Watched
 from fluxproof.watch.curves import thinned
 from fluxproof.watch.explain import Explainer, Explanation
 from fluxproof.watch.live import Live, Look
-from fluxproof.watch.packets import Packets
+from fluxproof.watch.packets import Note, Packets
 from fluxproof.watch.page import Scene, state_of, view
 from fluxproof.watch.replay import LiveReplay
 from fluxproof.watch.responses import Responses, steps_in
@@ -52,7 +52,9 @@ from fluxproof.watch.source import Tcp, source_of
 from golden_model import drive as drives
 from golden_model.drive_keys import DriveError
 from golden_model.estimators.flux_monitor import CONDITIONS, FAULTS
-from golden_model.io.telemetry_words import COUNT, LAYOUT
+from golden_model.generated.register_names import ADDRESSES as REGISTER_ADDRESSES
+from golden_model.io.fault_latch import NAMES
+from golden_model.io.telemetry_words import COUNT, LAYOUT, NOTE_WORD
 from golden_model.registers import registers
 from golden_model.units import from_si
 from studies.live import browser
@@ -95,11 +97,13 @@ def watched(*pieces: bytes, capacity: int = 1000) -> Live:
 
 def test_packets_in_pieces(words):
     """Cut anywhere, a stream gives the same packets; bad bytes cost the packets that they hit, and no other."""
-    rng, data = np.random.default_rng(1), raw(words[:200])
+    rng, note = np.random.default_rng(1), raw([NOTE_WORD, 120, 1 << NAMES.index("stall"), *[0] * (COUNT - 3)])
+    data = note + raw(words[:120]) + note + note + raw(words[120:200]) + note[:40]
     cuts = [0, *sorted(rng.integers(0, len(data), 60).tolist()), len(data)]
     packets = Packets()
     got = np.concatenate([packets.feed(data[a:b]) for a, b in zip(cuts, cuts[1:], strict=False)])
-    assert np.array_equal(got, words[:200]) and (packets.skipped, packets.rest) == (0, b"")
+    assert np.array_equal(got, words[:200]) and (packets.skipped, packets.rest) == (0, note[:40])
+    assert packets.notes == [Note(120, 1 << NAMES.index("stall"))] * 3
 
     bad = words[:200].copy()
     bad[50, 8] |= 1 << 31  # theta_me is unsigned
@@ -191,7 +195,8 @@ def test_a_pipe_loses_nothing_to_the_look_at_its_begin(tmp_path):
 
 
 def test_server_in_c(words, tmp_path):
-    """docs/software/telemetry_server.c: the packets arrive; a broken connection is made again, and its gap marked."""
+    """docs/software/telemetry_server.c: the packets arrive; a broken connection is made again, its gap marked, and the
+    first fault told."""
     if shutil.which("gcc") is None:
         pytest.skip("gcc is not installed")
     code = ROOT / "docs" / "software" / "telemetry_server.c"
@@ -199,7 +204,11 @@ def test_server_in_c(words, tmp_path):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    server = subprocess.Popen([tmp_path / "server", "-", str(port)], stdin=subprocess.PIPE)
+    window = bytearray(4096)
+    window[REGISTER_ADDRESSES["first_fault"]] = 1 << NAMES.index("overcurrent") | 1 << NAMES.index("u_dc_high")
+    (tmp_path / "uio").write_bytes(window)
+    command = [tmp_path / "server", "-", str(port), "127.0.0.1", tmp_path / "uio"]
+    server = subprocess.Popen(command, stdin=subprocess.PIPE)
     live = Live(Tcp("127.0.0.1", port), 5000, LiveReplay(SET))
 
     def until(total):
@@ -224,10 +233,12 @@ def test_server_in_c(words, tmp_path):
         while live.source.socket is None:
             live.pump()
         time.sleep(0.1)
-        server.stdin.write(raw(words[1200:1500]))
+        off = int(np.flatnonzero(np.diff(values(words, LAYOUT["run"])) < 0)[0]) + 1
+        server.stdin.write(raw(words[1200 : off + 100]))
         server.stdin.close()
-        until(1300)
-        assert live.total + live.lost == 1500 and 0 < live.lost <= 200 and live.packets.skipped == 0
+        until(off - 100)
+        assert live.total + live.lost == off + 100 and 0 < live.lost <= 200 and live.packets.skipped == 0
+        assert live.events[-1] == (off, "gates off: overcurrent, u_dc_high")
         assert server.wait(10) == 0
     finally:
         server.kill()
