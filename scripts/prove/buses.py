@@ -157,10 +157,14 @@ PROOFS = (
                 "        full     <= '0';\n        cause",
             ),
         ),
-        method="bmc",
-        depth=17,  # three rows, the end, a look; beyond, the solvers take too long
-        generics={"RING_ROWS": 2, "ROW_WORDS": 2},
-        assumed="a ring of 2 rows of 2 words of 1 bit, up to 1 row after a write that stops it",
+        depth=6,
+        spies=(
+            "index", "write_at", "left", "word_1", "ram", "waiting", "live", "hit", "ended", "wrapped", "full", "inside",
+            "valid_1", "final_1", "stop_1", "end_2",
+        ),
+        generics={"RING_ROWS": 3, "ROW_WORDS": 3},
+        search_generics={"RING_ROWS": 2, "ROW_WORDS": 2},
+        assumed="a ring of 3 rows of 3 words of 1 bit, up to 3 rows after a write that stops it",
         search_depth=17,
         patience=300,
     ),

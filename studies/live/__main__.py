@@ -6,7 +6,7 @@ which leaves out rows where its client is too slow; watch runs as a command, wit
 session of the page whose answers nobody reads stands for a slow browser.  One run has a wrong bit in one packet.  Then
 the page is opened in a browser (page.py).
 
-    python -m studies.live [--seconds 60]
+    python -m studies.live [--seconds 60] [--events 600]
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import json
 import os
 import re
 import shutil
-import socket
 import subprocess
 import sys
 import tempfile
@@ -27,11 +26,13 @@ from typing import NamedTuple
 
 from bokeh.client import pull_session
 
-from fluxproof.checkout import BUILD, ROOT
+from fluxproof.checkout import BUILD
 from fluxproof.files import write_json
 from studies.live.browser import CHROMIUM
 from studies.live.drive import DRIVE_FILE, WRONG_BIT, WRONG_SIGNAL
+from studies.live.events import planted
 from studies.live.page import told
+from studies.live.server import build_server, free_port
 
 RATES = 10_000, 20_000
 MOST_MB, MOST_GROWTH_MB = 500.0, 20.0
@@ -52,20 +53,6 @@ class Run(NamedTuple):
     processor: float  # share of one core
     load: float  # mean load of the machine
     said: str
-
-
-def build_server(folder: Path) -> Path:
-    """docs/software/telemetry_server.c, compiled."""
-    code, made = ROOT / "docs" / "software" / "telemetry_server.c", folder / "telemetry_server"
-    subprocess.run(["cc", "-O2", "-Wall", "-Wextra", "-Werror", code, "-o", made], check=True)
-    return made
-
-
-def free_port() -> int:
-    """A port that nobody listens at."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return free.getsockname()[1]
 
 
 def memory_mb(process: int) -> float:
@@ -126,7 +113,9 @@ def main() -> int:
     """Measure, print and write the figures; 1 if one misses its target."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--seconds", type=float, default=60.0, help="of the streams")
-    seconds = parser.parse_args().seconds
+    parser.add_argument("--events", type=float, default=0.0, help="seconds of the core in Verilator (0: left out)")
+    args = parser.parse_args()
+    seconds, events = args.seconds, args.events
     figures = []
 
     def note(figure: str, ours, target, unit: str, good: bool) -> None:
@@ -164,6 +153,9 @@ def main() -> int:
     else:
         for figure in told(out.with_suffix(".png")):
             note(*figure)
+        if events > 0.0 and shutil.which("verilator"):
+            for figure in planted(events, out.with_name("live_events.png")):
+                note(*figure)
     write_json(out, figures)
     return 0 if all(f["pass"] for f in figures) else 1
 

@@ -4,8 +4,8 @@
     python -m studies.live.drive --rate 20000 --rows 100000 | telemetry_server - 5555
 
 The inputs of one closed loop again and again, over which the state of the core runs on from its reset: a plant would
-need more of the processor than `watch`, which is to be measured.  Where the processor is too slow for the rate the drive
-stands still, and the last line on stderr says for how long: only rows that were written can be lost.
+need more of the processor than `watch`, which is to be measured.  Where the processor is too slow for the rate the
+drive stands still, and the last line on stderr says for how long: only rows that were written can be lost.
 """
 
 from __future__ import annotations
