@@ -2,11 +2,11 @@
 """The core in Verilator on the example's motor, as long as it is wanted, with three events; packets to the standard
 output.
 
-    python -m studies.live.core drive.toml --seconds 600 --uio uio | telemetry_server - 5555 127.0.0.1 uio
+    python -m studies.live.core drive.toml --uio uio | telemetry_server - 5555 127.0.0.1 uio
 
-A bench imposes the speeds of all operating points, again and again.  The machine is that of the drive file until its
-resistance rises; then a line of the encoder is lost, so that the code steps to and fro at its place; then one bit of
-one packet is wrong.  ``--uio``: a file in the place of the registers, in which first_fault stands.
+A bench imposes the speeds of all operating points, again and again.  Each line on the standard input is the next event:
+the machine's resistance rises; a line of the encoder is lost, so that the code steps to and fro at its place; one bit
+of one packet is wrong; the end.  ``--uio``: a file in the place of the registers, in which first_fault stands.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ import dataclasses
 import json
 import re
 import sys
-import time
+import threading
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -33,8 +34,8 @@ from golden_model.generated.register_names import ADDRESSES
 from golden_model.io.telemetry_words import LAYOUT, PACKET, pack
 from golden_model.registers import registers
 
-TURNS = 200  # of all operating points: more than ten minutes of any machine
-RESISTANCE_AT, LINE_AT, BIT_AT = 0.35, 0.9, 0.95  # of the time
+TURNS = 500  # of all operating points: more than any machine needs
+EVENTS = "resistance", "line", "bit", "end"
 RESISTANCE = 1.5  # times that of the drive file
 WRONG_SIGNAL, WRONG_BIT = "i_d", 5
 FIRST = FLAGS.index("first_fault")
@@ -51,8 +52,8 @@ def slow_drive(path: Path) -> Path:
     return path
 
 
-def send(drive: Drive, seconds: float, out, uio: Path) -> dict[str, int]:
-    """Packets for ``seconds``; the numbers of the samples at which each event began, and of the last one."""
+def send(drive: Drive, asked: Sequence[str], out, uio: Path) -> dict[str, int]:
+    """Packets until as many lines as EVENTS are in ``asked``; the numbers of the samples at which each event began."""
     register_set, scenario = registers(drive), motor.scenario(drive, TURNS)
     described = Machine.from_mapping(vars(drive.machine))
     warm = dataclasses.replace(described, resistance_ohm=RESISTANCE * described.resistance_ohm)
@@ -60,14 +61,15 @@ def send(drive: Drive, seconds: float, out, uio: Path) -> dict[str, int]:
     plant = PlantPeriods(drive, scenario, machine=described, mode=IMPOSED_SPEED)
     run_now(device.start(register_set.values, 1))
     at: dict[str, int] = {}
-    window, lost_code, begin, k = bytearray(4096), 0, time.monotonic(), 0
-    while (spent := (time.monotonic() - begin) / seconds) < 1.0 and k < len(scenario):
+    window, lost_code = bytearray(4096), 0
+    for k in range(len(scenario)):
+        due = EVENTS[: len(asked)]
         inputs = plant.inputs(k)
         plant.rows.clear()
-        if spent >= RESISTANCE_AT and "resistance" not in at:
+        if "resistance" in due and "resistance" not in at:
             plant.plant.params = SwitchingPlant(warm, Inverter(), IMPOSED_SPEED).params
             at["resistance"] = k
-        if spent >= LINE_AT and "line" not in at and abs(scenario.load[k]) > 10.0:
+        if "line" in due and "line" not in at and abs(scenario.load[k]) > 10.0:
             at["line"], lost_code = k, inputs["position_code"]
         if "line" in at:
             inputs["position_code"] = lost_code ^ (k & 1)
@@ -75,7 +77,7 @@ def send(drive: Drive, seconds: float, out, uio: Path) -> dict[str, int]:
         plant.advance(k, got.edge_clocks * (plant.period_s / got.clocks), got.gate_words)
         sample = fluxproof.Sample._make((*(inputs[name] for name in INPUT_PORTS), got.running))
         words = np.array(pack(k, sample._asdict() | {name: got.observed[name] for name in PACKET}), "<u4")
-        if spent >= BIT_AT and "bit" not in at:
+        if "bit" in due and "bit" not in at:
             at["bit"] = k
             words[LAYOUT[WRONG_SIGNAL].word] ^= 1 << WRONG_BIT
         if got.flags[FIRST] != window[ADDRESSES["first_fault"]]:
@@ -84,19 +86,21 @@ def send(drive: Drive, seconds: float, out, uio: Path) -> dict[str, int]:
                 file.write(window)
         out.write(words.tobytes())
         out.flush()
-        k += 1
-    return at | {"samples": k}
+        if "end" in due:
+            return at | {"end": k}
+    raise RuntimeError(f"no end was asked for within {len(scenario)} samples")
 
 
 def main() -> int:
     """Send and say on stderr at which samples the events were."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("drive", type=Path, help="the drive file that slow_drive wrote")
-    parser.add_argument("--seconds", type=float, required=True)
     parser.add_argument("--uio", type=Path, required=True)
     args = parser.parse_args()
     args.uio.touch()
-    print(json.dumps(send(drives.load(args.drive), args.seconds, sys.stdout.buffer, args.uio)), file=sys.stderr)
+    asked: list[str] = []
+    threading.Thread(target=lambda: asked.extend(iter(sys.stdin.readline, "")), daemon=True).start()
+    print(json.dumps(send(drives.load(args.drive), asked, sys.stdout.buffer, args.uio)), file=sys.stderr)
     return 0
 
 
