@@ -43,12 +43,13 @@ from fluxproof.watch.curves import thinned
 from fluxproof.watch.explain import Explainer, Explanation
 from fluxproof.watch.live import Live, Look
 from fluxproof.watch.packets import Note, Packets
-from fluxproof.watch.page import Scene, state_of, view
+from fluxproof.watch.page import Scene, curves, state_of, view
 from fluxproof.watch.replay import LiveReplay
 from fluxproof.watch.responses import Responses, steps_in
 from fluxproof.watch.server import allowed, serve, token_for
 from fluxproof.watch.sinks import PlotJuggler
 from fluxproof.watch.source import Tcp, source_of
+from fluxproof.watch.trigger import GATES, LEVELS, NOTHING, REFERENCE, events, holds
 from golden_model import drive as drives
 from golden_model.drive_keys import DriveError
 from golden_model.estimators.flux_monitor import CONDITIONS, FAULTS
@@ -314,8 +315,8 @@ def test_page_in_a_browser(words, tmp_path):
         explainer.found.append(Explanation(off, "explained", "Dead time: 3.1 <V>"))
         page.until(f"{TEXT}.includes('explained: Dead time: 3.1 <V>')")
 
-        named = {name for _, name in page.names("button", "combobox")}
-        assert named >= {"Window [s]", "Hold", "Hold when the gates go off", "Export what is shown (Parquet)"}
+        named = {name for _, name in page.names("button", "combobox", "spinbutton", "textbox")}
+        assert named >= {"Window [s]", "Hold", "Hold when", "Pre-trigger", "Export what is shown (Parquet)"}
         assert all(named)
         focus_on(page, "Hold")
         page.key(" ")
@@ -416,6 +417,21 @@ def test_flags_in_words(words):
     said = state_of(fields)
     assert "u_q at its limit" in said and said.endswith("current model at its range, compensation at its limit")
     assert len(CONDITIONS) == FAULTS.int_bits
+
+
+def test_an_event_holds_the_picture_where_the_rows_before_it_are_seen():
+    """Gates, references and levels; once, when the event has come to its place in the window, and not again."""
+    fields = {"run": np.ones(100), **{name: np.zeros(100) for name in ("omega_ref", "i_d_ref", "i_q_ext")}}
+    fields["run"][40:] = 0
+    fields["i_d_ref"][60:] = 5
+    si = {"i_q": np.where((np.arange(100) >= 20) & (np.arange(100) < 30), 3.0, 1.0)}
+    assert [events(what, 2.0, fields, si).tolist() for what in (NOTHING, GATES, REFERENCE)] == [[], [40], [60]]
+    assert events("i_q rises above", 2.0, fields, si).tolist() == [20]
+    assert events("i_q falls below", 2.0, fields, si).tolist() == [30]
+    row = np.array([50])
+    assert holds(row, 101, 0.5, 10) and not holds(row + 1, 101, 0.5, 10)
+    assert holds(row - 9, 101, 0.5, 10) and not holds(row - 10, 101, 0.5, 10)
+    assert set(LEVELS) <= set(curves(watched().look(0), DRIVE))
 
 
 def test_thinned_keeps_peaks():
