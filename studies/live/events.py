@@ -70,7 +70,7 @@ def planted(seconds: float, picture: Path) -> list[Figure]:
                 stdin=subprocess.PIPE, stdout=server.stdin, stderr=subprocess.PIPE, text=True,
             )  # fmt: skip
             server.stdin.close()
-            with Browser(url, folder, height=1400) as page:
+            with Browser(url, folder, height=920) as page:
                 read = Reader(page)
                 lasted = _story(read, core, seconds, picture)
                 answer = core.communicate("end\n", timeout=MOST_S)[1]
@@ -83,11 +83,12 @@ def planted(seconds: float, picture: Path) -> list[Figure]:
 
 def _story(read: Reader, core: subprocess.Popen, seconds: float, picture: Path) -> float:
     """Plant one event after the other; how long it took [s]."""
-    assert core.stdin is not None
+    orders = core.stdin
+    assert orders is not None  # a pipe
 
     def plant() -> None:
-        core.stdin.write("next\n")
-        core.stdin.flush()
+        orders.write("next\n")
+        orders.flush()
 
     read.until(lambda: read.rows > 0, MOST_S)  # the core is compiled
     begin = time.monotonic()
@@ -117,7 +118,7 @@ def judged(read: Reader, at: dict[str, int], lasted: float, seconds: float) -> l
         ("events: the core in Verilator ran for", round(lasted), round(seconds), "s", lasted >= 0.9 * seconds),
         ("events: its samples", at["end"] + 1, "", "1", True),
         (
-            "events: explanations before the first that name it",
+            "events: explanations before it that name it",
             len(quiet),
             0,
             f"of {len(before)}",
