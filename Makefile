@@ -95,7 +95,7 @@ compare: setup ## diagnose the same cases with alternative methods
 timeline: setup ## draw the timeline of one control period
 	$(PYTHON_RUN) -m studies.timeline $(ARGS)
 
-live: setup ## does watch keep up with 10 and 20 kHz (ARGS='--seconds 300')
+live: setup ## does watch keep up with 10 and 20 kHz, does its page tell what is planted (ARGS='--seconds 300 --events 600')
 	OPENBLAS_NUM_THREADS=1 $(PYTHON_RUN) -m studies.live $(ARGS)
 
 board: setup ## measure the figures of encoders, converters and the closed loop of a board

@@ -96,14 +96,18 @@ def commission_file(
     reverse: bool | None,
     folder: Path,
     hold_a: float | None = None,
-    tell: Callable[[str, object], None] = lambda kind, what: None,
+    tell: Callable[[str, object], None] | None = None,
 ) -> int:
-    """The whole of it on an open bus; the exit status.  ``tell``: told what runs "now", each "step", and the "end"."""
+    """The whole of it on an open bus; the exit status.
+
+    ``tell``: told what runs "now", each "step", and the "end"; with it the step responses are measured, too.
+    """
     from fluxproof.commission import document
     from fluxproof.commission.session import Refusal
     from fluxproof.commission.steps import commission
 
-    steps, began = [], bus.now()
+    steps, began, respond = [], bus.now(), tell is not None
+    tell = tell or (lambda kind, what: None)
     text = read_text(path)
     drive = replace(drive, sensors=replace(drive.sensors, position_reverse=False, theta_offset_rad=0.0))
 
@@ -131,7 +135,7 @@ def commission_file(
 
     before = _stop_once()
     try:
-        found, _ = commission(bus, drive, reverse, progress, done, hold_a)
+        found, _ = commission(bus, drive, reverse, progress, done, hold_a, respond)
     except Refusal as refusal:
         ended("refused", str(refusal))
         say(f"fluxproof: {path}: refused: {refusal}", sys.stderr)

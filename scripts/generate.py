@@ -116,6 +116,7 @@ def outputs() -> dict[Path, str]:
         PACKAGE: render(),
         generate_telemetry.ENTITY: generate_telemetry.render(),
         generate_telemetry.DOCUMENT: generate_telemetry.document(),
+        generate_telemetry.C_HEADER: generate_telemetry.c_header(),
         generate_drive_keys.DOCUMENT: generate_drive_keys.document(),
         **generated.files(),
     }

@@ -18,6 +18,7 @@ from fluxproof.cosim.driven_plant import Scenario
 from fluxproof.cosim.sensor_edges import edges_of
 from fluxproof.simulate import scene
 from fluxproof.simulate.margins import current_loop, margins, speed_loop, turning_current_loop
+from fluxproof.simulate.run import run as simulated_run
 from fluxproof.simulate.session import simulate
 from golden_model.board_registers import core_changes
 from golden_model.drive import load
@@ -53,6 +54,17 @@ def edited(tmp_path, **changes):
 
 
 # ---------------------------------------------------------------- verdicts
+
+
+def test_the_trims_of_a_commissioned_file_are_those_of_its_sensors():
+    """Encoder and converters mounted as the file says: the step is that of a file without trims."""
+    plain = simulated_run(DRIVE, registers(DRIVE), scene.current_step(DRIVE))
+    trims = {"theta_offset_rad": 2.0, "position_reverse": True, "current_offset_code": (33000.0, 32000.0, 32768.0)}
+    drive = changed("sensors", **trims, current_gain=(1.1, 0.9, 1.0), u_dc_offset_code=20.0, u_dc_gain=1.05)
+    told = simulated_run(drive, registers(drive), scene.current_step(drive))
+    for name, within in (("i_q", 0.05), ("i_d", 0.05), ("u_max", 0.5)):
+        assert told[name][-200:].mean() == pytest.approx(plain[name][-200:].mean(), abs=within), name
+
 
 # Physics that the simulation does not use
 FOR_DIAGNOSE = "\n[plant.machine]\ncogging_order = 12\ncogging_amplitude_nm = 0.01\n[plant.timing]\ndelay_s = 1e-6\n"

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 from urllib.request import urlopen
 
 import numpy as np
@@ -23,29 +24,40 @@ from bokeh.client import pull_session
 from cocotb_tests.support.drives import PAPER
 from fluxproof.checkout import DRIVES, ROOT
 from fluxproof.command import main
-from fluxproof.commission.session import Step
-from fluxproof.commission.simulated import SimulatedBus, board_of
-from fluxproof.cosim.scenarios import everything
+from fluxproof.commission.responses import step_responses
+from fluxproof.commission.session import Session, Step
+from fluxproof.commission.simulated import Board, SimulatedBus, board_of
+from fluxproof.cosim import golden_loop
+from fluxproof.cosim.scenarios import everything, scenario
+from fluxproof.cosim.step_response import LOOPS
 from fluxproof.diagnosis.example import motor
 from fluxproof.diagnosis.replay.capture import capture, packets
 from fluxproof.diagnosis.replay.telemetry import MAGIC
 from fluxproof.diagnosis.replay.telemetry_stream import values
-from fluxproof.plant import IMPOSED_SPEED
+from fluxproof.plant import IMPOSED_SPEED, Machine
+from fluxproof.simulate.response import length
+from fluxproof.simulate.run import inverter_of
+from fluxproof.watch.answers import told
 from fluxproof.watch.commissioning import Page, Story, Watched
 from fluxproof.watch.curves import thinned
 from fluxproof.watch.explain import Explainer, Explanation
-from fluxproof.watch.live import Live
-from fluxproof.watch.packets import Packets
-from fluxproof.watch.page import Scene, state_of, view
+from fluxproof.watch.live import Live, Look
+from fluxproof.watch.packets import Note, Packets
+from fluxproof.watch.page import Scene, curves, state_of, view
 from fluxproof.watch.replay import LiveReplay
+from fluxproof.watch.responses import Responses, steps_in
 from fluxproof.watch.server import allowed, serve, token_for
 from fluxproof.watch.sinks import PlotJuggler
 from fluxproof.watch.source import Tcp, source_of
+from fluxproof.watch.trigger import GATES, LEVELS, NOTHING, REFERENCE, events, holds
 from golden_model import drive as drives
 from golden_model.drive_keys import DriveError
 from golden_model.estimators.flux_monitor import CONDITIONS, FAULTS
-from golden_model.io.telemetry_words import COUNT, LAYOUT
+from golden_model.generated.register_names import ADDRESSES as REGISTER_ADDRESSES
+from golden_model.io.fault_latch import NAMES
+from golden_model.io.telemetry_words import COUNT, LAYOUT, NOTE_WORD
 from golden_model.registers import registers
+from golden_model.units import from_si
 from studies.live import browser
 from studies.live.browser import TEXT
 
@@ -86,11 +98,13 @@ def watched(*pieces: bytes, capacity: int = 1000) -> Live:
 
 def test_packets_in_pieces(words):
     """Cut anywhere, a stream gives the same packets; bad bytes cost the packets that they hit, and no other."""
-    rng, data = np.random.default_rng(1), raw(words[:200])
+    rng, note = np.random.default_rng(1), raw([NOTE_WORD, 120, 1 << NAMES.index("stall"), *[0] * (COUNT - 3)])
+    data = note + raw(words[:120]) + note + note + raw(words[120:200]) + note[:40]
     cuts = [0, *sorted(rng.integers(0, len(data), 60).tolist()), len(data)]
     packets = Packets()
     got = np.concatenate([packets.feed(data[a:b]) for a, b in zip(cuts, cuts[1:], strict=False)])
-    assert np.array_equal(got, words[:200]) and (packets.skipped, packets.rest) == (0, b"")
+    assert np.array_equal(got, words[:200]) and (packets.skipped, packets.rest) == (0, note[:40])
+    assert packets.notes == [Note(120, 1 << NAMES.index("stall"))] * 3
 
     bad = words[:200].copy()
     bad[50, 8] |= 1 << 31  # theta_me is unsigned
@@ -182,7 +196,8 @@ def test_a_pipe_loses_nothing_to_the_look_at_its_begin(tmp_path):
 
 
 def test_server_in_c(words, tmp_path):
-    """docs/software/telemetry_server.c: the packets arrive; a broken connection is made again, and its gap marked."""
+    """docs/software/telemetry_server.c: the packets arrive; a broken connection is made again, its gap marked, and the
+    first fault told."""
     if shutil.which("gcc") is None:
         pytest.skip("gcc is not installed")
     code = ROOT / "docs" / "software" / "telemetry_server.c"
@@ -190,7 +205,11 @@ def test_server_in_c(words, tmp_path):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    server = subprocess.Popen([tmp_path / "server", "-", str(port)], stdin=subprocess.PIPE)
+    window = bytearray(4096)
+    window[REGISTER_ADDRESSES["first_fault"]] = 1 << NAMES.index("overcurrent") | 1 << NAMES.index("u_dc_high")
+    (tmp_path / "uio").write_bytes(window)
+    command = [tmp_path / "server", "-", str(port), "127.0.0.1", tmp_path / "uio"]
+    server = subprocess.Popen(command, stdin=subprocess.PIPE)
     live = Live(Tcp("127.0.0.1", port), 5000, LiveReplay(SET))
 
     def until(total):
@@ -215,10 +234,12 @@ def test_server_in_c(words, tmp_path):
         while live.source.socket is None:
             live.pump()
         time.sleep(0.1)
-        server.stdin.write(raw(words[1200:1500]))
+        off = int(np.flatnonzero(np.diff(values(words, LAYOUT["run"])) < 0)[0]) + 1
+        server.stdin.write(raw(words[1200 : off + 100]))
         server.stdin.close()
-        until(1300)
-        assert live.total + live.lost == 1500 and 0 < live.lost <= 200 and live.packets.skipped == 0
+        until(off - 100)
+        assert live.total + live.lost == off + 100 and 0 < live.lost <= 200 and live.packets.skipped == 0
+        assert live.events[-1] == (off, "gates off: overcurrent, u_dc_high")
         assert server.wait(10) == 0
     finally:
         server.kill()
@@ -294,8 +315,8 @@ def test_page_in_a_browser(words, tmp_path):
         explainer.found.append(Explanation(off, "explained", "Dead time: 3.1 <V>"))
         page.until(f"{TEXT}.includes('explained: Dead time: 3.1 <V>')")
 
-        named = {name for _, name in page.names("button", "combobox")}
-        assert named >= {"Window [s]", "Hold", "Hold when the gates go off", "Export what is shown (Parquet)"}
+        named = {name for _, name in page.names("button", "combobox", "spinbutton", "textbox")}
+        assert named >= {"Window [s]", "Hold", "Hold when", "Pre-trigger", "Export what is shown (Parquet)"}
         assert all(named)
         focus_on(page, "Hold")
         page.key(" ")
@@ -336,6 +357,59 @@ def test_token(words):
     assert not allowed("a", {}) and allowed(None, {})
 
 
+def running(inertia: float) -> Live:
+    """A speed step and a step of i_q of the paper's drive, whose inertia is that of the file times ``inertia``."""
+    steps = {"rpm": {0.0: 183, 0.2: 732}, "i_q": {0.50: 1.5}, "torque_mode": ((0.45, 0.55),)}
+    given = scenario(DRIVE, 0.55, load={0.05: 1.0}, **steps)
+    machine = Machine.from_mapping(vars(DRIVE.machine))
+    machine = replace(machine, inertia_kgm2=inertia * machine.inertia_kgm2)
+    options = {"dead_time_s": DRIVE.inverter.dead_time_s, "inverter": inverter_of(DRIVE)}
+    seen = golden_loop.simulate(DRIVE, SET, given, machine, **options).observed
+    fields = {name: getattr(given, name) for name in ("omega_ref", "i_d_ref", "i_q_ext", "speed_mode")}
+    fields |= {"run": given.enable, **{name: seen[name] for name in ("i_q", "theta_me", "omega_me", "u_dc", "v_comp")}}
+    live = watched(capacity=10)
+    live.total = len(given)
+    live.look = lambda count, names: Look(np.arange(len(given)), fields, np.zeros(0, np.int64))
+    return live
+
+
+@pytest.mark.parametrize("inertia", [1.0, 2.0])
+def test_a_step_is_cut_out_and_stands_beside_its_prediction(inertia):
+    """Equal where the drive is that of the file; a larger inertia is seen in the speed's response alone."""
+    responses = Responses(running(inertia), DRIVE, SET)
+    responses.renew()
+    assert {name: r.counter for name, r in responses.latest.items()} == {"current loop": 5000, "speed loop": 2000}
+    for name, response in responses.latest.items():
+        apart = np.abs(response.measured.values[20:] - response.predicted.values).max()
+        rise, told = (float(row[1].split()[0]) for row in response.told())
+        if inertia == 1.0 or name == "current loop":
+            assert apart < 0.06 * (response.after - response.before), name
+        else:
+            assert rise > 1.3 * told
+    before = dict(responses.latest)
+    responses.renew(lambda *_: pytest.fail("a step that is known is predicted again"))
+    assert responses.latest == before
+
+
+def test_a_step_counts_only_at_rest_and_until_the_loop_has_settled():
+    """Not within a gap, not before the speed of the step before has come, not where another reference moves."""
+    drive, loop = DRIVE, LOOPS[1]
+    n, size = 9000, int(from_si("omega_ref", 100.0, DRIVE))
+    quiet = {name: np.zeros(n, np.int64) for name in ("i_d_ref", "i_q_ext", "i_q", "u_dc")}
+    fields = quiet | {name: np.ones(n, np.int64) for name in ("run", "speed_mode")}
+    fields["omega_ref"] = np.where(np.arange(n) < 3000, 0, size)
+    fields["omega_me"] = fields["omega_ref"].copy()
+    rows = lambda cuts=(), **others: steps_in(  # noqa: E731
+        Look(np.arange(n), fields | others, np.array(cuts, np.int64)), drive, loop
+    )
+    behind = 3000 + length(drive, loop, 100.0)
+    assert rows() == [(3000, behind)]
+    assert rows((3500,)) == [] and rows((2990,)) == [] and rows((behind,)) == [(3000, behind)]
+    assert rows(omega_me=fields["omega_me"] + size // 4) == []
+    assert rows(i_d_ref=(np.arange(n) > 3100).astype(int)) == []
+    assert rows(speed_mode=quiet["i_q"]) == [] and rows(run=quiet["i_q"]) == []
+
+
 def test_flags_in_words(words):
     """The flags of the last row by name; the flux monitor's bits too."""
     fields = watched(raw(words[:50])).look(10).fields | {"flux_faults": np.array([36]), "sat_q": np.array([1])}
@@ -343,6 +417,21 @@ def test_flags_in_words(words):
     said = state_of(fields)
     assert "u_q at its limit" in said and said.endswith("current model at its range, compensation at its limit")
     assert len(CONDITIONS) == FAULTS.int_bits
+
+
+def test_an_event_holds_the_picture_where_the_rows_before_it_are_seen():
+    """Gates, references and levels; once, when the event has come to its place in the window, and not again."""
+    fields = {"run": np.ones(100), **{name: np.zeros(100) for name in ("omega_ref", "i_d_ref", "i_q_ext")}}
+    fields["run"][40:] = 0
+    fields["i_d_ref"][60:] = 5
+    si = {"i_q": np.where((np.arange(100) >= 20) & (np.arange(100) < 30), 3.0, 1.0)}
+    assert [events(what, 2.0, fields, si).tolist() for what in (NOTHING, GATES, REFERENCE)] == [[], [40], [60]]
+    assert events("i_q rises above", 2.0, fields, si).tolist() == [20]
+    assert events("i_q falls below", 2.0, fields, si).tolist() == [30]
+    row = np.array([50])
+    assert holds(row, 101, 0.5, 10) and not holds(row + 1, 101, 0.5, 10)
+    assert holds(row - 9, 101, 0.5, 10) and not holds(row - 10, 101, 0.5, 10)
+    assert set(LEVELS) <= set(curves(watched().look(0), DRIVE))
 
 
 def test_thinned_keeps_peaks():
@@ -387,6 +476,23 @@ def test_what_the_page_of_a_commissioning_tells():
     assert page.left_out == 1 and page.messages.qsize() == 2
     kind, (_, integers) = page.messages.get()
     assert kind == "row" and integers[0] == rows[0]["i_d"] and integers[-1] == rows[0]["theta_me"]
+
+
+def test_step_responses_of_a_commissioning_stand_beside_their_predictions():
+    """The drive is that of the file: rise and overshoot of both loops are those of the prediction."""
+    drive = replace(DRIVE, inverter=replace(DRIVE.inverter, dead_time_s=0.0))  # with one, the rotor's angle counts
+    bus, story = SimulatedBus(drive, Board(Machine.from_mapping(vars(drive.machine)))), Story()
+    step = step_responses(Session(bus, drive), drive)
+    assert bus.read("enable") == 0 and not step.notes and [at.loop for _, at, _ in step.responses] == list(LOOPS)
+    story.predict(step)
+    for response in story.latest.values():
+        assert len(response.measured.time) > 50
+        expected = np.interp(response.measured.time, *response.predicted)
+        apart = np.abs(expected - response.measured.values).max()
+        assert apart < 0.06 * (response.after - response.before), response.told()
+    at = step.responses[0][1]
+    assert f"{at.loop.name} 0 to {at.after:.4g} A in " in step.said and "speed loop" in step.said
+    assert told(story.latest).count("predicted") == 2
 
 
 @pytest.mark.slow

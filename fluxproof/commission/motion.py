@@ -269,14 +269,14 @@ def magnet(session: Session, first: Step, v_dead: float) -> Step:
         seconds = max(0.1, 1.5 * abs(speed - at) / (LARGEST_I_Q * 0.5 * s.limit * k))
         s.ramp(seconds, omega_ref=(at, speed), i_d_ref=(held, j))
         at, held = speed, j
-        _arrive(s, speed)
+        arrive(s, speed)
         points.append(_held(s, speed))
     s.ramp(max(0.1, 1.5 * abs(at) / (LARGEST_I_Q * 0.5 * s.limit * k)), omega_ref=(at, 0.0), i_d_ref=(held, 0.0))
     s.gates_off()
     return judge(s, first, points, v_1)
 
 
-def _arrive(s: Session, speed: float) -> None:
+def arrive(s: Session, speed: float) -> None:
     """Until the mean speed of a tenth of a second is near the reference, or patience ends."""
     s.settle(HELD_S)
     end = s.bus.now() + ARRIVE_S
@@ -375,7 +375,7 @@ def closed_loop(session: Session) -> Step:
     for to in (speed, -speed):
         s.progress(f"closed loop, {to / drive.machine.pole_pairs * 30 / math.pi:.0f} rpm")
         s.ramp(seconds * (2.0 if at else 1.0), 40, omega_ref=(at, to))
-        _arrive(s, to)
+        arrive(s, to)
         at = to
         found.append(abs(_held(s, to)[0] / to - 1.0))
     s.ramp(seconds, 40, omega_ref=(at, 0.0))

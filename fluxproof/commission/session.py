@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fluxproof.commission.bus import Bus
+from fluxproof.cosim.step_response import Curve, Situation
 from fluxproof.plant.transforms import linear_limit
 from golden_model.board_registers import SECTORS, board_registers
 from golden_model.drive import Drive
@@ -51,6 +52,7 @@ class Step:
     values: dict[str, Value]
     said: str
     notes: dict = field(default_factory=dict)
+    responses: tuple[tuple[Drive, Situation, Curve], ...] = ()  # the drive, a step of it, what was measured
 
 
 class Seen:

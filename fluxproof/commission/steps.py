@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from fluxproof.commission import alignment, current_scale, motion, winding, wiring
+from fluxproof.commission import alignment, current_scale, motion, responses, winding, wiring
 from fluxproof.commission.bus import Bus, BusError
 from fluxproof.commission.session import LEAST_HEARTBEAT_S, Refusal, Session, Step
 from golden_model.board_registers import board_generics
@@ -44,11 +44,13 @@ def commission(
     progress: Callable[[str], None] = lambda text: None,
     done: Callable[[Step], None] = lambda step: None,
     hold_a: float | None = None,
+    respond: bool = False,
 ) -> tuple[Drive, list[Step]]:
     """(the drive with the measured values, the steps); Refusal with a reason.
 
     ``reverse_given``: the encoder's direction where the drive file states it.  ``done`` is told each step.
-    ``hold_a``: only a direct current [A] for an ammeter; the drive is then the given one.
+    ``hold_a``: only a direct current [A] for an ammeter; the drive is then the given one.  ``respond``: step responses
+    too, which measure nothing of the drive.
     """
     # With one update a period: the equations of a snapshot are those of a voltage that stands a whole period.
     session, steps = Session(bus, replace(drive, core=replace(drive.core, updates_per_period=1)), progress), []
@@ -72,6 +74,8 @@ def commission(
         add(motion.magnet(session, moved, wound.values["v_dead"].value))
         add(motion.closed_loop(session))
         found = _finished(session.drive, drive)
+        if respond:
+            add(responses.step_responses(session, found))
         add(current_scale.compare(drive, found))
     except BusError as error:
         raise Refusal(str(error)) from None

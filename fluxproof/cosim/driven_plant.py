@@ -30,6 +30,7 @@ class Scenario:
     brake: np.ndarray | None = None  # [Nm] largest torque of a brake on the shaft, see ``load_torque``
     changes: Mapping[int, Mapping[str, int]] = field(default_factory=dict)  # period -> registers from there on
     omega_m: float = 0.0  # mechanical speed at the start [rad/s]
+    theta_m: float = 0.0  # mechanical angle at the start [rad]
     clear_faults: np.ndarray | None = None  # 0 or 1; None: never
     temp_winding: np.ndarray | None = None  # winding temperature [degC]; NaN: reading lost; None: no sensor
 
@@ -88,11 +89,13 @@ def described_sensors(drive) -> Sensors:
 
 
 def build_plant(
-    drive, sensors: Sensors | None = None, machine: Machine | None = None, omega_m: float = 0.0, mode: int = FREE
-) -> tuple[SwitchingPlant, Sensors]:
+    drive, sensors: Sensors | None = None, machine: Machine | None = None, omega_m: float = 0.0, mode: int = FREE,
+    theta_m: float = 0.0,
+) -> tuple[SwitchingPlant, Sensors]:  # fmt: skip
     """Plant and sensors as drive.toml describes them; the dead time is that of the device's gates."""
     machine = machine or Machine.from_mapping(vars(drive.machine))
-    return SwitchingPlant(machine, Inverter(), mode, omega_m=omega_m), sensors or described_sensors(drive)
+    plant = SwitchingPlant(machine, Inverter(), mode, omega_m=omega_m, theta_m=theta_m)
+    return plant, sensors or described_sensors(drive)
 
 
 class PlantPeriods:
@@ -110,7 +113,7 @@ class PlantPeriods:
         mode: int = FREE,
     ):
         self.scenario, self.period_s, self.mode = scenario, drive.sample_time_s, mode
-        self.plant, described = build_plant(drive, sensors, machine, scenario.omega_m, mode)
+        self.plant, described = build_plant(drive, sensors, machine, scenario.omega_m, mode, scenario.theta_m)
         self.codes, self.slow_inputs, self.rows = sensor_params(described), scenario.slow_inputs(), []
 
     def inputs(self, k: int) -> dict[str, int]:

@@ -230,7 +230,7 @@ def simulate(
     bench = Bench(
         registers=values,
         config=register_set.config,
-        plant_state=initial_state(machine, params, omega_m=scenario.omega_m),
+        plant_state=initial_state(machine, params, omega_m=scenario.omega_m, theta_m=scenario.theta_m),
         plant_params=params,
         sensors=sensor_params(sensors or described_sensors(drive)),
         dead_time_s=float(dead_time_s),

@@ -6,6 +6,7 @@ run        the golden core on the switching plant; a trip turns the gates off
 margins    phase and gain margin of the loops, delay, sampling and the turning rotor included
 regeneration  what braking feeds back, and what the bus needs for it
 ripple     the current inside PWM periods
+response   a step of a reference on a running drive, predicted
 figures    what the runs and the data say, as numbers
 verdict    whether the drive is fit to be built, and why not
 pictures, page    the report

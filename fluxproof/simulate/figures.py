@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from fluxproof.cosim.scenarios import RPM
+from fluxproof.cosim.step_response import rise_and_overshoot
 from fluxproof.simulate import scene as scenes
 from fluxproof.simulate.regeneration import Regeneration
 from fluxproof.simulate.run import Run
@@ -42,12 +43,10 @@ def of_speed(run: Run) -> dict:
     speed, found = rpm(run), {}
     step, load = run.scene.stage("speed step"), run.scene.stage("load step")
     before = run.scene.stages[run.scene.stages.index(step) - 1].reference
-    size = step.reference - before
-    over = (speed[step.first : step.end].max() - step.reference) / size
-    found["speed_overshoot"] = figure(100.0 * max(over, 0.0), "%")
-    reached = np.flatnonzero(speed[step.first : step.end] >= before + 0.9 * size)
+    reached, over = rise_and_overshoot(speed[step.first : step.end], before, step.reference)
+    found["speed_overshoot"] = figure(100.0 * over, "%")
     period = run.t[1] - run.t[0]
-    found["speed_rise_to_90_percent"] = figure(reached[0] * period * 1e3 if len(reached) else None, "ms")
+    found["speed_rise_to_90_percent"] = figure(None if reached is None else reached * period * 1e3, "ms")
     under = speed[load.first : load.end]
     found["load_torque"] = figure(load.load, "Nm", "calculated")
     found["load_dip"] = figure(load.reference - under.min(), "rpm")
@@ -74,13 +73,12 @@ def of_current_step(run: Run, where: str = "") -> dict:
     stage = run.scene.stage("current step")
     i_q, size = run["i_q"][stage.first : stage.end], stage.reference
     before = run["i_q"][stage.first - 50 : stage.first].mean()
-    made = (i_q - before) / (size - before)
+    reached, over = rise_and_overshoot(i_q, before, size)
     period = run.t[1] - run.t[0]
-    first = np.flatnonzero(made >= 0.9)
     return {
         f"current_step{where}": figure(size, "A", "calculated"),
-        f"current_overshoot{where}": figure(100.0 * max(made.max() - 1.0, 0.0), "%"),
-        f"current_rise_to_90_percent{where}": figure(first[0] * period * 1e6 if len(first) else None, "µs"),
+        f"current_overshoot{where}": figure(100.0 * over, "%"),
+        f"current_rise_to_90_percent{where}": figure(None if reached is None else reached * period * 1e6, "µs"),
         f"current_settled_noise{where}": figure(np.std(i_q[-100:]), "A rms"),
     }
 

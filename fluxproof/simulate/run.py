@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fluxproof.cosim.driven_plant import described_sensors
 from fluxproof.cosim.golden_loop import simulate
 from fluxproof.cosim.sensor_edges import edges_of
-from fluxproof.plant import FREE, IMPOSED_SPEED, Bus, Inverter, Machine
+from fluxproof.plant import FREE, IMPOSED_SPEED, Bus, Inverter, Machine, Sensors
 from fluxproof.simulate.scene import Scene
 from golden_model import supply
 from golden_model.drive import Drive
@@ -50,6 +51,21 @@ def inverter_of(drive: Drive) -> Inverter:
     """Device drops; the dead time is in the gates."""
     i = drive.inverter
     return Inverter(0.0, i.v_switch_v, i.v_diode_v, i.r_switch_ohm, i.r_diode_ohm)
+
+
+def sensors_of(drive: Drive) -> Sensors:
+    """Converters and encoder whose errors the trims of [sensors] take off, as commissioning has measured them."""
+    s, mid, turning = drive.sensors, 2 ** (drive.sensors.adc_bits - 1), -1 if drive.sensors.position_reverse else 1
+    codes = s.current_offset_code or (mid,) * 3
+    return replace(
+        described_sensors(drive),
+        current_gain_error=tuple(1.0 / trim - 1.0 for trim in s.current_gain),
+        current_offset_a=tuple((code - mid) * s.current_range_a / mid for code in codes),
+        u_dc_gain_error=1.0 / s.u_dc_gain - 1.0,
+        u_dc_offset_v=s.u_dc_offset_code * s.u_dc_range_v / 2**s.adc_bits,
+        position_offset_rad=-turning * s.theta_offset_rad / drive.machine.pole_pairs,
+        position_direction=turning,
+    )
 
 
 def bus_of(drive: Drive) -> Bus:
@@ -93,6 +109,7 @@ def _simulate(drive, register_set, scene, progress):
         register_set,
         scene.scenario,
         machine=machine_of(drive, scene.imposed),
+        sensors=sensors_of(drive),
         dead_time_s=drive.inverter.dead_time_s,
         mode=IMPOSED_SPEED if scene.imposed else FREE,
         inverter=inverter_of(drive),

@@ -46,6 +46,7 @@ def run(args: argparse.Namespace) -> int:
     from fluxproof.watch.explain import Explainer  # numba and pyarrow take a second
     from fluxproof.watch.live import Live
     from fluxproof.watch.replay import LiveReplay
+    from fluxproof.watch.responses import Responses
     from fluxproof.watch.sinks import Csv, PlotJuggler
     from fluxproof.watch.source import source_of
 
@@ -67,15 +68,20 @@ def run(args: argparse.Namespace) -> int:
         source = source_of(args.source)
     sinks = [Csv(args.csv, drive)] if args.csv else []
     sinks += [PlotJuggler(args.plotjuggler, drive)] if args.plotjuggler else []
-    live = Live(source, rows, LiveReplay(register_set), sinks)
+    replay = LiveReplay(register_set)
+    replay.compile()
+    live = Live(source, rows, replay, sinks)
     explainer = Explainer(live, drive, args.drive, register_set, args.every) if args.every > 0 else None
+    responses = Responses(live, drive, register_set)
     threads = [threading.Thread(target=live.run)]
+    if not args.no_page:
+        threads.append(threading.Thread(target=responses.run, args=(live.ending,), daemon=True))
     if explainer is not None:
         threads.append(threading.Thread(target=explainer.run, args=(live.ending,), daemon=True))
     for thread in threads:
         thread.start()
     try:
-        _show(args, live, drive, explainer)
+        _show(args, live, drive, explainer, responses)
     except KeyboardInterrupt:
         pass
     finally:
@@ -92,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
     return 1 if live.replay.difference else 0
 
 
-def _show(args, live, drive, explainer) -> None:
+def _show(args, live, drive, explainer, responses) -> None:
     """The page, or a wait; until --seconds have passed or the reader has failed."""
     end = None if args.seconds is None else time.monotonic() + args.seconds
     over = lambda: live.failure is not None or (end is not None and time.monotonic() >= end)  # noqa: E731
@@ -106,7 +112,7 @@ def _show(args, live, drive, explainer) -> None:
     except ImportError:
         raise DriveError("the page needs bokeh: pip install 'fluxproof[fleet]', or --no-page") from None
     try:
-        scene = Scene(live, drive, explainer)
+        scene = Scene(live, drive, explainer, responses)
         server, url = serve(lambda doc: view(doc, scene), args.listen, args.port, token_for(args.listen))
     except OSError as error:
         raise DriveError(f"--listen {args.listen} --port {args.port}: {error.strerror or error}") from None

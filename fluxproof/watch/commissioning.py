@@ -18,6 +18,10 @@ import numpy as np
 
 from fluxproof.commission.bus import Bus
 from fluxproof.commission.session import Step
+from fluxproof.cosim.step_response import Curve
+from fluxproof.simulate.response import predicted
+from fluxproof.watch.responses import Response
+from golden_model.board_registers import board_set
 from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError
 from golden_model.units import to_si
@@ -82,6 +86,7 @@ class Story:
         self.rows: deque[tuple[float, tuple[int, ...]]] = deque(maxlen=KEPT)
         self.steps: list[Step] = []
         self.now, self.end = "", ""
+        self.latest: dict[str, Response] = {}
 
     def take(self, kind: str, what) -> None:
         """A message of the commissioning."""
@@ -90,10 +95,19 @@ class Story:
                 self.rows.append(what)
             elif kind == "step":
                 self.steps.append(what)
+                if what.responses:
+                    threading.Thread(target=self.predict, args=(what,), daemon=True).start()
             elif kind == "now":
                 self.now = what
             else:
                 self.now, self.end = "", what
+
+    def predict(self, step: Step) -> None:
+        """What `simulate` says of the step responses; seconds, in which rows go on coming."""
+        for drive, at, measured in step.responses:
+            expected = predicted(drive, board_set(drive), at)
+            time = np.arange(len(expected)) * drive.sample_time_s
+            self.latest[at.loop.name] = Response(at.loop, at.before, at.after, measured, Curve(time, expected))
 
     def listen(self, messages) -> None:
         """All messages, for ever."""
@@ -140,6 +154,7 @@ def view(doc, story: Story, drive: Drive) -> None:
     from bokeh.layouts import column, row
     from bokeh.models import ColumnDataSource, Div
 
+    from fluxproof.watch.answers import Answers
     from fluxproof.watch.curves import PICTURE_MS, WIDE, plot, thinned
 
     sources: dict[str, ColumnDataSource] = {}
@@ -152,10 +167,11 @@ def view(doc, story: Story, drive: Drive) -> None:
     for other in plots[1:]:
         other.x_range = plots[0].x_range
     plots[-1].xaxis.axis_label = "s of the commissioning"
+    answered, answers = Answers(drive), Div(width=WIDE - 10)
     steps, rpm = Div(width=WIDE - 10), 30.0 / np.pi / drive.machine.pole_pairs
 
     def renew() -> None:
-        steps.text = story.told()
+        steps.text, answers.text = story.told(), answered.renew(story.latest)
         times, rows = story.picture()
         if len(times) < 2:
             return
@@ -165,5 +181,6 @@ def view(doc, story: Story, drive: Drive) -> None:
             x, y = thinned(times, si[name])
             source.data = {"x": x, "y": y}
 
-    doc.add_root(row(column(*plots, sizing_mode="stretch_width"), steps, sizing_mode="stretch_width"))
+    left = column(*plots, row(*answered.plots.values(), sizing_mode="stretch_width"), sizing_mode="stretch_width")
+    doc.add_root(row(left, column(steps, answers), sizing_mode="stretch_width"))
     doc.add_periodic_callback(renew, PICTURE_MS)

@@ -18,6 +18,7 @@ from fluxproof.diagnosis.replay.telemetry_stream import values
 from fluxproof.watch.packets import Packets
 from fluxproof.watch.replay import LiveReplay
 from fluxproof.watch.source import Source
+from golden_model.io.fault_latch import NAMES
 from golden_model.io.telemetry_words import COUNT, COUNTER, FIELDS, LAYOUT
 
 MOST_EVENTS = 50
@@ -43,6 +44,12 @@ class Look(NamedTuple):
 def fields_of(rows: np.ndarray, names: Sequence[str] = tuple(FIELDS)) -> dict[str, np.ndarray]:
     """{field: (n,) int64} of packets."""
     return {name: values(rows, LAYOUT[name]) for name in names}
+
+
+def reason_of(first_fault: int) -> str:
+    """The faults of the register by name."""
+    named = [name for bit, name in enumerate(NAMES) if first_fault >> bit & 1]
+    return ", ".join(named) or "no fault, enable fell"
 
 
 class Live:
@@ -86,6 +93,9 @@ class Live:
         rows = self.packets.feed(data)
         if len(rows):
             self._take(rows)
+        while self.packets.notes:
+            note = self.packets.notes.pop(0)
+            self.events.append((note.counter, f"gates off: {reason_of(note.first_fault)}"))
         return len(rows)
 
     def _take(self, rows: np.ndarray) -> None:

@@ -11,13 +11,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from bokeh.document import without_document_lock
 from bokeh.layouts import column, row
-from bokeh.models import Button, ColumnDataSource, CustomJS, Div, Select, Toggle
+from bokeh.models import Button, ColumnDataSource, CustomJS, Div, NumericInput, Select, Toggle
 from bokeh.plotting import figure
 
+from fluxproof.watch.answers import Answers
 from fluxproof.watch.curves import COLOURS, PICTURE_MS, POINTS, WIDE, plot, thinned
 from fluxproof.watch.explain import Explainer
 from fluxproof.watch.live import Live, Look
+from fluxproof.watch.responses import Responses
 from fluxproof.watch.sinks import scales_of, table
+from fluxproof.watch.trigger import CHOICES, NOTHING, events, holds
 from golden_model.drive import Drive
 from golden_model.estimators.flux_monitor import CONDITIONS
 from golden_model.units import si_per_lsb
@@ -34,6 +37,7 @@ class Scene(NamedTuple):
     live: Live
     drive: Drive
     explainer: Explainer | None
+    responses: Responses | None = None
 
 
 def curves(look: Look, drive: Drive) -> dict[str, np.ndarray]:
@@ -81,14 +85,18 @@ def view(doc: Any, scene: Scene) -> None:
     sources["limit"] = ColumnDataSource({"x": [], "y": []})
     circle.line("x", "y", source=sources["limit"], color="#000000", name="limit")
     circle.scatter("x", "y", source=sources["voltage"], size=2, color="#d55e00", name="voltage")
-    said, digital, why, flags = (Div(width=WIDE - 10) for _ in range(4))
+    said, digital, why, flags, answers = (Div(width=WIDE - 10) for _ in range(5))
+    answered = Answers(drive)
     window = Select(title="Window [s]", value="1", options=list(WINDOWS_S), name="window", width=80)
     hold = Toggle(label="Hold", name="hold")
-    trigger = Toggle(label="Hold when the gates go off", name="trigger")
+    trigger = Select(title="Hold when", value=NOTHING, options=list(CHOICES), name="trigger", width=160)
+    level = NumericInput(title="Level [SI, rpm]", value=0.0, mode="float", name="level", width=100)
+    before = Select(title="Pre-trigger", value="0.5", options=["0.1", "0.5", "0.9"], name="before", width=80)
     export = Button(label="Export what is shown (Parquet)", name="export")
     carried = ColumnDataSource({"file": []})
     carried.js_on_change("data", CustomJS(args={"s": carried}, code=SAVE))
     held: list[Look] = []
+    seen = [live.total]  # rows of the last picture
 
     def rows() -> int:
         return max(2, round(float(window.value) / drive.sample_time_s))
@@ -96,14 +104,17 @@ def view(doc: Any, scene: Scene) -> None:
     def renew() -> None:
         said.text, digital.text = escape(live.told()), f"<b>{escape(live.replay.told())}</b>"
         why.text = _explained(scene.explainer)
+        if scene.responses is not None:
+            answers.text = escape(scene.responses.problem) or answered.renew(scene.responses.latest)
         if hold.active or live.total < 2:
             return
         look = live.look(rows())
-        run = look.fields["run"]
-        if trigger.active and np.any(np.diff(run[: len(run) // 2 + 1]) < 0):  # as much after the event as before it
+        si, fresh = curves(look, drive), live.total - seen[0]
+        at = events(trigger.value, float(level.value or 0.0), look.fields, si)
+        if holds(at, len(look.counter), float(before.value), fresh):
             hold.active = True
-        held[:] = [look]
-        _show(look, drive, sources)
+        held[:], seen[:] = [look], [live.total]
+        _show(look, si, drive, sources)
         flags.text = escape(state_of(look.fields))
 
     @without_document_lock
@@ -118,8 +129,11 @@ def view(doc: Any, scene: Scene) -> None:
         doc.add_next_tick_callback(save)
 
     export.on_click(ask_save)
-    controls = column(row(window, hold, trigger), export, digital, said, flags, why, circle, width=WIDE)
-    doc.add_root(row(column(*plots, sizing_mode="stretch_width"), controls, sizing_mode="stretch_width"))
+    controls = column(
+        row(window, hold, export), row(trigger, level, before), digital, said, flags, why, answers, circle, width=WIDE
+    )
+    left = column(*plots, row(*answered.plots.values(), sizing_mode="stretch_width"), sizing_mode="stretch_width")
+    doc.add_root(row(left, controls, sizing_mode="stretch_width"))
     doc.add_root(carried_root(carried))
     doc.add_periodic_callback(renew, PICTURE_MS)
 
@@ -138,8 +152,8 @@ def carried_root(carried: ColumnDataSource) -> Div:
     return Div(text="", tags=[carried])
 
 
-def _show(look: Look, drive: Drive, sources: dict[str, ColumnDataSource]) -> None:
-    si, time_s = curves(look, drive), look.counter * drive.sample_time_s
+def _show(look: Look, si: dict[str, np.ndarray], drive: Drive, sources: dict[str, ColumnDataSource]) -> None:
+    time_s = look.counter * drive.sample_time_s
     for name in sources.keys() & COLOURS.keys():
         x, y = thinned(time_s, si[name])
         sources[name].data = {"x": x, "y": y}

@@ -15,7 +15,7 @@ from fluxproof.diagnosis.replay.chain import run_of
 from fluxproof.diagnosis.replay.digital import CONVERGED, hexadecimal
 from fluxproof.diagnosis.replay.flow import OWNER, block_name, first_in_flow
 from golden_model import fluxproof
-from golden_model.io.telemetry_words import PACKET
+from golden_model.io.telemetry_words import FIELDS, PACKET
 from golden_model.registers import RegisterSet
 
 
@@ -27,6 +27,14 @@ class LiveReplay:
         self.state, self.known, self.agreed = fluxproof.State(), False, 0
         self.equal = 0
         self.difference: str | None = None
+
+    def compile(self) -> None:
+        """Before the first row comes: numba needs half a minute the first time, and a server waits for two seconds."""
+        row = np.zeros(1, np.int64)
+        for self.known in (False, True):
+            self.take(row, dict.fromkeys(FIELDS, row))
+        self.cut(False)
+        self.equal, self.difference = 0, None
 
     def cut(self, after_reset: bool) -> None:
         """Rows are missing before the next one, or the core was reset."""

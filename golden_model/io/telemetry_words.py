@@ -53,6 +53,10 @@ WORDS = (
 )  # fmt: skip
 COUNT = len(WORDS)
 HEADER_WORD = MAGIC << 16 | VERSION << 8 | COUNT
+# A note of the host between two packets, as long as a packet: why the gates went off, which no sample contains
+NOTE = 0x80  # in the place of the version
+NOTE_WORD = MAGIC << 16 | NOTE << 8 | COUNT
+NOTE_FAULT = 2  # its word with the register first_fault; word 1 is the number of the first sample without gates
 WORD = Format(0, 32, 0)
 INDEX = Format(0, (COUNT - 1).bit_length(), 0)
 

@@ -64,12 +64,18 @@ def plant(fault: Fault, tree: Path) -> Path:
 
 
 def with_spies(verilog: str, entity: str, spies: tuple[str, ...]) -> str:
-    """The module with each signal of ``spies`` as an additional output spy_NAME."""
+    """The module with each signal of ``spies`` as an additional output spy_NAME; a memory as all its words."""
     start = re.search(rf"^module {entity}\b", verilog, re.MULTILINE).start()
     head, body = verilog[:start], verilog[start:]
     ports, drivers = "", ""
     for name in spies:
         found = re.search(rf"^  (?:wire|reg) (\[\d+:0\] )?{name};", body, re.MULTILINE)
+        memory = re.search(rf"reg \[(\d+):0\] {name}\[(\d+):0\]", body)
+        if memory is not None:
+            width, words = int(memory.group(1)) + 1, int(memory.group(2)) + 1
+            ports += f",\n   output [{width * words - 1}:0] spy_{name}"
+            drivers += f"  assign spy_{name} = {{{', '.join(f'{name}[{k}]' for k in reversed(range(words)))}}};\n"
+            continue
         if found is None:
             raise BrokenProof(f"{entity} has no signal {name}, which its harness looks at")
         ports += f",\n   output {found.group(1) or ''}spy_{name}"

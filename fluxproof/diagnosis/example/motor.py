@@ -70,9 +70,9 @@ def sensors(drive: Drive) -> Sensors:
     )
 
 
-def scenario(drive: Drive) -> Scenario:
-    """A test bench imposes the speeds of PLAN, the core regulates its currents; for the mode IMPOSED_SPEED."""
-    points = np.array(PLAN)
+def scenario(drive: Drive, turns: int = 1) -> Scenario:
+    """A test bench imposes the speeds of PLAN, ``turns`` times; the core regulates its currents; for IMPOSED_SPEED."""
+    points = np.tile(PLAN, (turns, 1))
     before = np.concatenate([np.zeros((1, 3)), points[:-1]])
     rise = np.minimum((np.arange(RAMP + DWELL) + 1) / RAMP, 1.0)[None, :, None]
     speed, i_d, i_q = np.concatenate(before[:, None, :] + rise * (points - before)[:, None, :]).T

@@ -35,7 +35,7 @@ def capture(drive, register_set, scenario: Scenario, machine=None, inverter=None
     """
     machine = machine or Machine.from_mapping(vars(drive.machine))
     params = plant_params(machine, inverter or Inverter(), mode=mode)
-    plant_state = initial_state(machine, params, omega_m=scenario.omega_m)
+    plant_state = initial_state(machine, params, omega_m=scenario.omega_m, theta_m=scenario.theta_m)
     samples = np.zeros((len(scenario), len(fluxproof.Sample._fields)), np.int64)
     references = (scenario.omega_ref, scenario.i_d_ref, scenario.i_q_ext, scenario.speed_mode)
     for column, values in enumerate((*references, *scenario.slow_inputs(), scenario.enable)):
