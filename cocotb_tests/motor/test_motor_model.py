@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.needs import skip_without_ghdl5
+from fluxproof.cosim import sleeping
 from fluxproof.hil.registers import PORTS, code, machine_of, motor_registers, motor_scale
 from fluxproof.plant.pmsm import Machine
 from golden_model.motor.motor_model import Shown
@@ -35,6 +36,17 @@ def test_core_and_motor_in_one():
     assert not len(wrong), f"gates differ at clock {wrong[0]}"
     assert rtl.observed[-1] == golden.observed[-1]
     assert golden.observed[-1]["omega_me"] > 1000, "the shaft does not turn"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("all_clocks", "exact"), [(sleeping.EVERY_CLOCK, True), (("charge", "gates", "host"), False)])
+def test_nothing_changes_in_what_sleeps(monkeypatch, all_clocks, exact):
+    """Every register of the core that sleeps between samples, at every clock from the reset; a watchdog must not."""
+    skip_without_ghdl5()
+    monkeypatch.setattr(sleeping, "EVERY_CLOCK", all_clocks)
+    core = closed_loop.rtl_of(closed_loop.parts(), sleeping.with_witness)
+    core.tick(60_000)
+    assert (core.missed == 0) == exact and core.get("running")
 
 
 @pytest.mark.slow

@@ -30,6 +30,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--only", choices=PARTS, nargs="+", default=list(PARTS), help="these parts")
     parser.add_argument("--seconds", type=float, default=10.0, help="length of the ride beside the plant")
     parser.add_argument("--samples", type=int, default=1_000_000, help="of healthy drives beside their residual")
+    parser.add_argument("--periods", type=int, default=20_000, help="of the closed loop whose values are compared")
     options = parser.parse_args(arguments)
     rows = [row for part in options.only for row in PARTS[part](options)]
     before = json.loads(OUT.read_text()) if OUT.exists() else []

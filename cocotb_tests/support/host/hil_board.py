@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 
 from cocotb_tests.support.host.rtl_board import RtlBoard
+from fluxproof.cosim.sleeping import with_sleep
 from fluxproof.hil.load import Word, load_words
 from fluxproof.plant import Inverter, Machine, Sensors
 from golden_model.formats import MOTOR_SPEED
@@ -18,6 +19,7 @@ class HilBoard(RtlBoard):
     """``machine``, ``inverter``, ``sensors``: of the motor; its registers are loaded over the bus at the start."""
 
     top = "fluxproof_hil"
+    rewrite = staticmethod(with_sleep)
 
     def __init__(self, drive, machine: Machine, inverter: Inverter, sensors: Sensors):
         super().__init__(drive)
