@@ -167,7 +167,7 @@ PROOFS = (
             Fault("a free leg below its rail", LEGS, "clamp(free_4, -diode_v,", "clamp(free_4, shift_left(-diode_v, 1),"),
             Fault("a lower device that drives", LEGS, "V_W), not minus_5);", "V_W), minus_5);"),
         ),
-        depth=3,
+        depth=2,
         spies=("valid", "minus_5", "with_high_5", "with_low_5", "off_5", "high_6", "low_6", "off_6"),
         free=("x_3",),
         assumed="bus and drops constant, their sum below the format's end; stiffness times current may be anything",
