@@ -62,7 +62,7 @@ RAILS = """\
   end
 `ifdef LEMMAS
   reg [1:0] age = 0;  // clocks that the pipeline has had, up to 3
-  always @(posedge clk) age <= &age ? age : age + 1;
+  always @(posedge clk) age <= !begun ? 0 : &age ? age : age + 1;
   wire signed [25:0] top_6 = $signed(spy_high_6), bottom_6 = $signed(spy_low_6), free_6 = $signed(spy_off_6);
   always @(posedge clk) if (begun) begin
     assert (spy_valid[8:0] == {flight[0], flight[1], flight[2], flight[3], flight[4], flight[5], flight[6], flight[7],
@@ -167,7 +167,8 @@ PROOFS = (
             Fault("a free leg below its rail", LEGS, "clamp(free_4, -diode_v,", "clamp(free_4, shift_left(-diode_v, 1),"),
             Fault("a lower device that drives", LEGS, "V_W), not minus_5);", "V_W), minus_5);"),
         ),
-        depth=2,
+        method="pdr",
+        depth=12,
         spies=("valid", "minus_5", "with_high_5", "with_low_5", "off_5", "high_6", "low_6", "off_6"),
         free=("x_3",),
         assumed="bus and drops constant, their sum below the format's end; stiffness times current may be anything",
