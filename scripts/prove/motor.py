@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Properties of the motor of the FPGA: sums that fit, legs within their rails, friction that only brakes."""
+"""Properties of the motor of the FPGA: sums that fit, friction that only brakes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable
 from scripts.prove.pipeline import ports
 from scripts.prove.proof import Fault, Proof
 
-INVERTER, LEGS, SHAFT = (f"motor/motor_{name}.vhd" for name in ("inverter", "legs", "shaft"))
+INVERTER, SHAFT = "motor/motor_inverter.vhd", "motor/motor_shaft.vhd"
 
 # The voltages of leg a as the entity takes them, summed in 34 bits
 SUM = """\
@@ -37,49 +37,6 @@ SUM = """\
     assert (wide <= 34'sd8388608 * $signed({1'b0, n}) && wide >= -34'sd8388608 * $signed({1'b0, n}));
 `endif
   end
-"""
-
-RAILS = """\
-  // flight[k]: a sample went in k + 1 clocks ago; loaded: its voltages of leg a are there
-  reg [8:0] flight;
-  reg loaded = 0;
-  always @(posedge clk) flight <= rst ? 0 : {flight, in_valid};
-  always @(posedge clk) loaded <= !rst && (loaded || flight[5]);
-  wire signed [25:0] bus = $signed(u_dc), switch = $signed({1'b0, v_switch}), diode = $signed({1'b0, v_diode});
-  wire signed [25:0] top = $signed(high_a), bottom = $signed(low_a), free = $signed(off_a);
-  always @* assume (bus >= 0 && bus + diode < 8388608);
-  always @(posedge clk) if (begun) assume ($stable({u_dc, v_switch, v_diode}));
-
-  always @(posedge clk) if (begun && loaded) begin
-    // What a device loses is between nothing and its drop, whichever way the current flows.
-    assert (bus - switch <= top && top <= bus + diode);
-    assert (-diode <= bottom && bottom <= switch);
-    assert (-diode <= free && free <= bus + diode);
-    // Both devices see the same direction of the current.
-    assert (!(bottom > 0 && top < bus) && !(bottom < 0 && top > bus));
-    cover (top > bus && bottom > 0);
-    cover (free == -diode && diode != 0 && bottom < 0);
-  end
-`ifdef LEMMAS
-  reg [1:0] age = 0;  // clocks that the pipeline has had, up to 3
-  always @(posedge clk) age <= !begun ? 0 : &age ? age : age + 1;
-  wire signed [25:0] top_6 = $signed(spy_high_6), bottom_6 = $signed(spy_low_6), free_6 = $signed(spy_off_6);
-  always @(posedge clk) if (begun) begin
-    assert (spy_valid[8:0] == {flight[0], flight[1], flight[2], flight[3], flight[4], flight[5], flight[6], flight[7],
-                               flight[8]});
-    assert (age >= (flight[8:2] != 0 ? 3 : flight[1] ? 2 : flight[0]) && (age == 3 || !loaded));
-    if (age >= 2) begin
-      assert (spy_with_high_5 <= (spy_minus_5 ? v_diode : v_switch));
-      assert (spy_with_low_5 <= (spy_minus_5 ? v_switch : v_diode));
-      assert (-diode <= $signed(spy_off_5) && $signed(spy_off_5) <= bus + diode);
-    end
-    if (age == 3) begin
-      assert (bus - switch <= top_6 && top_6 <= bus + diode && -diode <= bottom_6 && bottom_6 <= switch);
-      assert (-diode <= free_6 && free_6 <= bus + diode);
-      assert (!(bottom_6 > 0 && top_6 < bus) && !(bottom_6 < 0 && top_6 > bus));
-    end
-  end
-`endif
 """
 
 BRAKES = """\
@@ -155,24 +112,6 @@ PROOFS = (
         assumed="steps of up to 31 clocks, any voltages and gates",
         search_depth=12,
         covers=False,  # the search reaches sums of both signs
-    ),
-    Proof(
-        name="motor_rails",
-        says="each voltage of a leg is that of its rail up to the drop of the device that conducts",
-        entity="motor_legs",
-        harness=around("motor_legs", RAILS),
-        faults=(
-            Fault("the diode's drop at a transistor", LEGS, "with_high_5 <= least(magnitude(x_4), v_switch);",
-                  "with_high_5 <= least(magnitude(x_4), v_diode);"),
-            Fault("a free leg below its rail", LEGS, "clamp(free_4, -diode_v,", "clamp(free_4, shift_left(-diode_v, 1),"),
-            Fault("a lower device that drives", LEGS, "V_W), not minus_5);", "V_W), minus_5);"),
-        ),
-        method="pdr",
-        depth=12,
-        spies=("valid", "minus_5", "with_high_5", "with_low_5", "off_5", "high_6", "low_6", "off_6"),
-        free=("x_3",),
-        assumed="bus and drops constant, their sum below the format's end; stiffness times current may be anything",
-        search_depth=24,
     ),
     Proof(
         name="motor_friction",
