@@ -23,6 +23,7 @@ from fluxproof.plant import IMPOSED_SPEED, Machine
 from fluxproof.plant.sensors import Sensors
 from fluxproof.simulate.run import inverter_of, machine_of
 from golden_model.drive import Drive, load
+from golden_model.estimators.motor_residual import DROP_I, DROP_OMEGA, LEAST
 from golden_model.front_ends import Converters, Encoder
 from golden_model.registers import registers
 from golden_model.units import from_si, si_per_lsb
@@ -114,6 +115,35 @@ def until_flag(drive: Drive, fault: Fault) -> float:
     result = play(drive, machine, noisy(drive, SEED, **fault.sensors(drive)), speed, i_q)
     flagged = np.flatnonzero(result.observed["motor_differs"])
     return flagged[0] * drive.sample_time_s if len(flagged) else math.inf
+
+
+class Least(NamedTuple):
+    """Smallest changes that the limits let through no longer, as shares of magnet flux and R."""
+
+    magnets: float
+    resistance: float
+
+
+def least_flagged(drive: Drive) -> Least:
+    """From the limit min + w |omega| + i |i| of the registers, at the operating points of FAULTS.
+
+    Magnets change the residual by delta psi omega T_s; R by delta R i T_s, at the lowest speed that is watched.
+    """
+    regs, t_s, m = registers(drive).values, drive.sample_time_s, drive.machine
+    of_flux = 2.0**-LEAST.frac_bits * drive.bases.flux_wb
+    slow = regs.residual_slow * si_per_lsb("omega_me", drive)
+
+    def limit(omega: float, amperes: float) -> float:
+        speed = round(omega / si_per_lsb("omega_me", drive))
+        current = round(amperes / si_per_lsb("i_q", drive))
+        parts = regs.residual_min + (speed * regs.residual_w >> DROP_OMEGA) + (current * regs.residual_i >> DROP_I)
+        return parts * of_flux / t_s
+
+    weak, warm = FAULTS[0], FAULTS[1]
+    omega = max(weak.speed * m.rated_speed_rad_s * m.pole_pairs, 1.15 * slow)
+    magnets = limit(omega, weak.current * m.rated_current_a) / (omega * m.magnet_flux_wb)
+    amperes = warm.current * m.rated_current_a
+    return Least(magnets, limit(1.15 * slow, amperes) / (m.resistance_ohm * amperes))
 
 
 def figures(options) -> list[dict]:
