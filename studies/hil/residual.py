@@ -105,15 +105,19 @@ FAULTS = (
 )  # fmt: skip
 
 
-def until_flag(drive: Drive, fault: Fault) -> float:
-    """Time from the first sample to the flag [s]; infinite without one."""
+def steady(drive: Drive, fault: Fault) -> Result:
+    """Steady running with the fault from the first sample on."""
     described, n = machine_of(drive, imposed=True), round(STEADY_S / drive.sample_time_s)
     machine = dataclasses.replace(described, **fault.machine(described))
     watched = registers(drive).values.residual_slow * si_per_lsb("omega_me", drive) / drive.machine.pole_pairs
     speed = np.full(n, max(fault.speed * drive.machine.rated_speed_rad_s, 1.15 * watched))
     i_q = np.full(n, fault.current * drive.machine.rated_current_a)
-    result = play(drive, machine, noisy(drive, SEED, **fault.sensors(drive)), speed, i_q)
-    flagged = np.flatnonzero(result.observed["motor_differs"])
+    return play(drive, machine, noisy(drive, SEED, **fault.sensors(drive)), speed, i_q)
+
+
+def until_flag(drive: Drive, fault: Fault) -> float:
+    """Time from the first sample to the flag [s]; infinite without one."""
+    flagged = np.flatnonzero(steady(drive, fault).observed["motor_differs"])
     return flagged[0] * drive.sample_time_s if len(flagged) else math.inf
 
 
