@@ -7,10 +7,9 @@ import numpy as np
 
 from fluxproof.checkout import BUILD
 from golden_model.estimators.motor_residual import LEAST
-from golden_model.registers import registers
 from studies.hil.beside_plant import OWN, beside_plant
 from studies.hil.drive import RATED_A, ride, servo
-from studies.hil.residual import FAULTS, drive_of, steady
+from studies.hil.residual import FAULTS, drive_of, limit_v, operating_point, steady
 
 OUT = BUILD / "studies" / "hil.png"
 SECONDS = 0.4
@@ -28,7 +27,6 @@ def figures(_options) -> list[dict]:
     mean = np.hypot(*(found[f"residual_mean_{x}"] for x in "dq")) * 2.0**-LEAST.frac_bits * drive.bases.flux_wb
     volts, t = mean / drive.sample_time_s, 1000 * drive.sample_time_s * np.arange(len(mean))
     flag = np.flatnonzero(found["motor_differs"])
-    least = registers(drive).values.residual_min * 2.0**-LEAST.frac_bits * drive.bases.flux_wb / drive.sample_time_s
 
     figure, axes = pyplot.subplots(3, 1, figsize=(9, 7.5), layout="constrained")
     last = slice(-round(0.06 / motor.period_s), None)
@@ -38,14 +36,14 @@ def figures(_options) -> list[dict]:
     axes[1].plot(ms, 100 * (both.motor[:, 0] - both.plant[:, 0]) / RATED_A, lw=0.5, color="C3")
     axes[1].set(ylabel="difference [% of rated]", xlabel="t [ms]")
     axes[2].plot(t, volts, color="C0", label="mean residual")
-    axes[2].axhline(least, color="0.6", ls=":", label="limit at rest without current")
+    axes[2].axhline(limit_v(drive, *operating_point(drive, fault)), color="0.5", ls=":", label="limit")
     if len(flag):
         axes[2].axvline(t[flag[0]], color="C3", lw=0.9, label=f"motor_differs after {t[flag[0]]:.0f} ms")
     axes[2].set(ylabel="[V]", xlabel="t [ms]", title=f"Beside a real motor: {fault.name}")
     for axis in axes:
         axis.grid(alpha=0.3)
         if axis.get_legend_handles_labels()[0]:
-            axis.legend(loc="upper right", fontsize=8)
+            axis.legend(loc="lower right" if axis is axes[2] else "upper left", fontsize=8)
     OUT.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(OUT, dpi=110)
     pyplot.close(figure)

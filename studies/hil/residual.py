@@ -109,9 +109,8 @@ def steady(drive: Drive, fault: Fault) -> Result:
     """Steady running with the fault from the first sample on."""
     described, n = machine_of(drive, imposed=True), round(STEADY_S / drive.sample_time_s)
     machine = dataclasses.replace(described, **fault.machine(described))
-    watched = registers(drive).values.residual_slow * si_per_lsb("omega_me", drive) / drive.machine.pole_pairs
-    speed = np.full(n, max(fault.speed * drive.machine.rated_speed_rad_s, 1.15 * watched))
-    i_q = np.full(n, fault.current * drive.machine.rated_current_a)
+    omega, amperes = operating_point(drive, fault)
+    speed, i_q = np.full(n, omega / drive.machine.pole_pairs), np.full(n, amperes)
     return play(drive, machine, noisy(drive, SEED, **fault.sensors(drive)), speed, i_q)
 
 
@@ -128,26 +127,27 @@ class Least(NamedTuple):
     resistance: float
 
 
+def limit_v(drive: Drive, omega: float, amperes: float) -> float:
+    """Voltage that the mean residual may have at this electrical speed and current, from the registers."""
+    regs = registers(drive).values
+    speed, current = round(omega / si_per_lsb("omega_me", drive)), round(amperes / si_per_lsb("i_q", drive))
+    parts = regs.residual_min + (speed * regs.residual_w >> DROP_OMEGA) + (current * regs.residual_i >> DROP_I)
+    return parts * 2.0**-LEAST.frac_bits * drive.bases.flux_wb / drive.sample_time_s
+
+
+def operating_point(drive: Drive, fault: Fault) -> tuple[float, float]:
+    """Electrical speed, at least what is watched, and current of a fault."""
+    slow = registers(drive).values.residual_slow * si_per_lsb("omega_me", drive)
+    m = drive.machine
+    return max(fault.speed * m.rated_speed_rad_s * m.pole_pairs, 1.15 * slow), fault.current * m.rated_current_a
+
+
 def least_flagged(drive: Drive) -> Least:
-    """From the limit min + w |omega| + i |i| of the registers, at the operating points of FAULTS.
-
-    Magnets change the residual by delta psi omega T_s; R by delta R i T_s, at the lowest speed that is watched.
-    """
-    regs, t_s, m = registers(drive).values, drive.sample_time_s, drive.machine
-    of_flux = 2.0**-LEAST.frac_bits * drive.bases.flux_wb
-    slow = regs.residual_slow * si_per_lsb("omega_me", drive)
-
-    def limit(omega: float, amperes: float) -> float:
-        speed = round(omega / si_per_lsb("omega_me", drive))
-        current = round(amperes / si_per_lsb("i_q", drive))
-        parts = regs.residual_min + (speed * regs.residual_w >> DROP_OMEGA) + (current * regs.residual_i >> DROP_I)
-        return parts * of_flux / t_s
-
-    weak, warm = FAULTS[0], FAULTS[1]
-    omega = max(weak.speed * m.rated_speed_rad_s * m.pole_pairs, 1.15 * slow)
-    magnets = limit(omega, weak.current * m.rated_current_a) / (omega * m.magnet_flux_wb)
-    amperes = warm.current * m.rated_current_a
-    return Least(magnets, limit(1.15 * slow, amperes) / (m.resistance_ohm * amperes))
+    """From the limit, at the operating points of FAULTS: magnets change the mean by delta psi omega, R by delta R i."""
+    (omega, amperes), (slow, rated) = (operating_point(drive, fault) for fault in FAULTS[:2])
+    m = drive.machine
+    magnets = limit_v(drive, omega, amperes) / (omega * m.magnet_flux_wb)
+    return Least(magnets, limit_v(drive, slow, rated) / (m.resistance_ohm * rated))
 
 
 def figures(options) -> list[dict]:
