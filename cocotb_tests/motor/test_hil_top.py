@@ -24,7 +24,7 @@ from golden_model.front_ends import Encoder
 from golden_model.io import board_map, motor_map
 from golden_model.io.register_map import OKAY
 
-HALF = 1700  # clocks of half a period: a step of the motor is 0.5 us
+HALF = 850  # clocks of half a period: a step of the motor is 1 us
 RPM = 9.549297
 LOADED, PACKET_BYTES = 40, 96  # packets until bring_up.c has loaded the registers
 

@@ -37,9 +37,9 @@ class HilBoard(RtlBoard):
         for name, value in words:
             assert self.write(self.map[name].address, value & 0xFFFFFFFF) == OKAY, name
 
-    def listen(self, clocks: int = 1) -> None:
-        """Clocks, whose telemetry is kept."""
-        rows = self.core.trace(clocks, ("m_axis_tvalid", "m_axis_tdata"))
+    def listen(self, n: int = 1) -> None:
+        """``n`` clocks, whose telemetry is kept."""
+        rows = self.core.trace(n, ("m_axis_tvalid", "m_axis_tdata"))
         self.stream.append(rows[rows[:, 0] == 1, 1])
 
     def capture(self) -> bytes:
