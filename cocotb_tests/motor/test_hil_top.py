@@ -24,7 +24,7 @@ from golden_model.front_ends import Encoder
 from golden_model.io import board_map, motor_map
 from golden_model.io.register_map import OKAY
 
-HALF = 850  # clocks of half a period: a step of the motor is 1 us
+HALF = 1700  # clocks of half a period: a step of the motor is 0.5 us; with 1/J of this shaft no longer one fits
 RPM = 9.549297
 LOADED, PACKET_BYTES = 40, 96  # packets until bring_up.c has loaded the registers
 
@@ -91,6 +91,6 @@ def test_bring_up_turns_the_motor_in_the_rtl(drive, tmp_path, capsys):
     capture.write_bytes(board.capture()[LOADED * PACKET_BYTES :])
     assert main(["dump", str(capture), "--drive", str(file), "-o", str(dump)]) == 0
     replayed, notes = digital.replay(recording(dump))
-    assert replayed.checked and replayed.first_difference is None and replayed.samples > 8000, notes
+    assert replayed.checked and replayed.first_difference is None and replayed.samples > 5000, notes
     watch = ["watch", str(capture), "--drive", str(file), "--no-page", "--every", "0", "--seconds", "0.5"]
-    assert main(watch) == 0 and f"{replayed.samples:,} rows, 0 lost" in capsys.readouterr().out
+    assert main(watch) == 0 and " rows, 0 lost, 0 bad bytes, 0 breaks" in capsys.readouterr().out
