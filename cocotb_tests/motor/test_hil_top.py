@@ -12,17 +12,21 @@ from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.host.bring_up import compiled
 from cocotb_tests.support.host.hil_board import HilBoard
 from cocotb_tests.support.needs import skip_without_ghdl5
+from cocotb_tests.support.recordings.dumps import recording
 from fluxproof.checkout import ROOT
+from fluxproof.command import main
 from fluxproof.diagnosis.ground.plant_section import plant_of
+from fluxproof.diagnosis.replay import digital
 from fluxproof.hil.load import erase_words, load_words
 from golden_model import drive as drives
 from golden_model.drive_keys import DriveError
 from golden_model.front_ends import Encoder
-from golden_model.io import motor_map
+from golden_model.io import board_map, motor_map
 from golden_model.io.register_map import OKAY
 
-HALF = 1700  # clocks of half a period: a step of the motor is 0.5 us
+HALF = 1700  # clocks of half a period: a step of the motor is 0.5 us; with 1/J of this shaft no longer one fits
 RPM = 9.549297
+LOADED, PACKET_BYTES = 40, 96  # packets until bring_up.c has loaded the registers
 
 
 @pytest.fixture(scope="module")
@@ -63,8 +67,11 @@ def test_what_the_motor_does_not_have_is_refused(drive, changes, said):
 
 
 @pytest.mark.slow
-def test_bring_up_turns_the_motor_in_the_rtl(drive, tmp_path):
-    """bring_up.c as it is, in Verilator: nothing but clocks outside; the motor's registers on the same bus."""
+def test_bring_up_turns_the_motor_in_the_rtl(drive, tmp_path, capsys):
+    """bring_up.c as it is, in Verilator: nothing but clocks outside; the motor's registers on the same bus.
+
+    dump and watch take the telemetry of this run; the golden core says the same of every sample of its own.
+    """
     skip_without_ghdl5()
     plant = plant_of(PAPER)
     board = HilBoard(drive, plant.machine, plant.inverter, plant.sensors)
@@ -72,9 +79,18 @@ def test_bring_up_turns_the_motor_in_the_rtl(drive, tmp_path):
     assert board.value("motor_psi_m") == loaded["motor_psi_m"]
     assert board.write(motor_map.registers()["motor_i_a"].address, 0) != OKAY
     program = compiled(tmp_path, drive, ROOT / "cocotb_tests" / "support" / "host" / "bus_pipe.c")
+    assert board.write(board_map.registers()["telemetry_enable"].address, 1) == OKAY
     done = board.run(program, "300")
     assert done.returncode == 0, done.stdout + done.stderr
     said = re.search(r"300 rpm wanted, ([\d.]+) rpm measured", done.stdout)
     assert said and abs(float(said[1]) - 300) < 12, done.stdout
     assert abs(max(board.speeds) * RPM - 300) < 12 and abs(board.speeds[-1] * RPM) < 5
     assert board.gate_word == 0 and board.value("motor_shoot_through") == 0
+    file, capture, dump = (tmp_path / name for name in ("drive.toml", "capture.bin", "run.fluxdump"))
+    file.write_text(PAPER.read_text().replace("clock_hz = 200e6", f"clock_hz = {drive.core.clock_hz}"))
+    capture.write_bytes(board.capture()[LOADED * PACKET_BYTES :])
+    assert main(["dump", str(capture), "--drive", str(file), "-o", str(dump)]) == 0
+    replayed, notes = digital.replay(recording(dump))
+    assert replayed.checked and replayed.first_difference is None and replayed.samples > 5000, notes
+    watch = ["watch", str(capture), "--drive", str(file), "--no-page", "--every", "0", "--seconds", "0.5"]
+    assert main(watch) == 0 and " rows, 0 lost, 0 bad bytes, 0 breaks" in capsys.readouterr().out

@@ -3,15 +3,23 @@
 
 from __future__ import annotations
 
+import itertools
+import math
+
 import numpy as np
 import pytest
 
 from cocotb_tests.support.needs import skip_without_ghdl5
-from fluxproof.hil.registers import PORTS, code, machine_of, motor_registers, motor_scale
+from fluxproof.cosim import sleeping
+from fluxproof.hil.registers import PORTS, ROOM, code, machine_of, motor_registers, motor_scale
 from fluxproof.plant.pmsm import Machine
+from golden_model.common.multiply_add import multiply_subtract
+from golden_model.fixed import round_half_up
+from golden_model.formats import FLUX, MOTOR_FLUX, MOTOR_LEG, MOTOR_VOLTAGE, PU
+from golden_model.motor import motor_flux, motor_legs, motor_model, motor_shaft
 from golden_model.motor.motor_model import Shown
-from studies.hil import closed_loop, equal, golden
-from studies.hil.beside_plant import HELD, OWN, beside_plant
+from studies.hil import closed_loop, equal, golden, residual
+from studies.hil.beside_plant import HELD, OWN, beside_plant, follow
 from studies.hil.drive import CLOCK_HZ, CURRENT_A, SERVO, SWITCHES, U_DC_V, ride, servo
 from studies.hil.plant import ANGLE_DEG, CURRENT_PERCENT, TORQUE_PERCENT, differences
 
@@ -35,6 +43,17 @@ def test_core_and_motor_in_one():
     assert not len(wrong), f"gates differ at clock {wrong[0]}"
     assert rtl.observed[-1] == golden.observed[-1]
     assert golden.observed[-1]["omega_me"] > 1000, "the shaft does not turn"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("all_clocks", "exact"), [(sleeping.EVERY_CLOCK, True), (("charge", "gates", "host"), False)])
+def test_nothing_changes_in_what_sleeps(monkeypatch, all_clocks, exact):
+    """Every register of the core that sleeps between samples, at every clock from the reset; a watchdog must not."""
+    skip_without_ghdl5()
+    monkeypatch.setattr(sleeping, "EVERY_CLOCK", all_clocks)
+    core = closed_loop.rtl_of(closed_loop.parts(), sleeping.with_witness)
+    core.tick(60_000)
+    assert (core.missed == 0) == exact and core.get("running")
 
 
 @pytest.mark.slow
@@ -73,3 +92,74 @@ def test_registers_say_what_the_machine_is():
     light = Machine(**(vars(SERVO) | {"inertia_kgm2": 1e-12}))
     with pytest.raises(ValueError, match=r"motor: k_j = .* does not fit U\(-31,56\)"):
         motor_registers(scale, light, SWITCHES)
+
+
+SHORTED = 0b111000  # the lower gates of all legs
+NO_EVENTS = (np.zeros(1, np.int64), np.zeros(1, np.int64), 0)
+
+
+def shorted(regs: motor_model.Registers, speed: int, steps: int, state=None) -> motor_model.State:
+    """The motor without drops, its terminals shorted, the shaft held at a speed."""
+    regs = regs._replace(v_switch=0, v_diode=0, hold=1, omega_set=speed)
+    state = motor_model.State(starting=12) if state is None else state
+    return follow(state, SHORTED, NO_EVENTS, steps, 0, 0, regs, motor_model.no_tables())[0]
+
+
+def test_rounding_makes_no_energy():
+    """Without R the flux stays to the last bit while the rotor turns; R takes energy until the flux rests."""
+    regs = motor_registers(motor_scale(SERVO, U_DC_V, CURRENT_A, CLOCK_HZ), SERVO, SWITCHES)
+    speed = round(3000 / 60 * motor_model.STEP / CLOCK_HZ / PORTS["omega_set"].fmt.lsb)
+    still = regs._replace(r_a=0, r_b=0, r_c=0, psi_start=regs.psi_m // 2)
+    state = shorted(still, speed, 100_000)
+    assert state.of_flux == (still.psi_start << motor_flux.DROP_OUT, 0) and abs(state.chain_1.i_q) > 1000
+    state, before = shorted(regs, speed, 100_000), math.inf  # the magnets drive a current, then the shaft stops
+    inverse_l, small = (regs.inv_l_d, regs.inv_l_q), 2  # LSB of a current at rest
+    for _ in range(3000):
+        state = shorted(regs, 0, 100, state)
+        i_d, i_q = state.chain_1.i_d, state.chain_1.i_q
+        energy = i_d**2 / inverse_l[0] + i_q**2 / inverse_l[1]
+        step = 2 * small * (abs(i_d) / inverse_l[0] + abs(i_q) / inverse_l[1]) + small**2 / min(inverse_l)
+        assert energy <= before + step, "a current grows without a voltage"
+        before = energy
+    assert max(abs(i_d), abs(i_q)) <= small and shorted(regs, 0, 10_000, state).of_flux == state.of_flux
+
+
+def test_a_rounded_loss_is_a_loss():
+    """R i rounded half up has the sign of i or is zero, and is at most twice as large, however small the product."""
+    rng = np.random.default_rng(5)
+    for _ in range(5000):
+        r, i = int(rng.integers(1 << rng.integers(1, 24))), int(rng.integers(-1 << 17, 1 << 17)) >> rng.integers(17)
+        minus, limited = multiply_subtract(r, i, 0, motor_flux.DROP_RI, motor_flux.LEG_W)
+        assert not limited and minus * i <= 0 and abs(minus) << motor_flux.DROP_RI <= 2 * r * abs(i), (r, i)
+
+
+def test_no_sum_overflows_inside_the_bounds():
+    """Each equation is linear in each input, so its largest values are at the corners of the bounds."""
+    leg, drop = motor_model.STEP * MOTOR_VOLTAGE.hi, motor_flux.DROP_R.hi  # any voltages, any R, any current
+    for legs in itertools.product((leg, -leg), repeat=3):
+        for i in itertools.product((PU.lo, PU.hi), repeat=3):
+            state, _ = motor_flux.step(motor_flux.State(), *legs, *i, 0, drop, drop, drop, 0)
+            s = [u - round_half_up(drop * x, motor_flux.DROP_RI) for u, x in zip(legs, i, strict=True)]
+            assert state.alpha == 2 * s[0] - s[1] - s[2]
+            exact = (s[1] - s[2]) * math.sqrt(3) * 2.0 ** (MOTOR_FLUX.frac_bits - 16 - MOTOR_LEG.frac_bits)
+            assert abs(state.beta - exact) <= 3e-6 * abs(exact) + 1e3
+    bus, room = round(ROOM / MOTOR_VOLTAGE.lsb), round(0.5 / MOTOR_VOLTAGE.lsb) - 1  # u_dc and the drop above it
+    for i in (PU.lo, PU.hi):
+        high, _, off = motor_legs.leg(i, bus, motor_legs.STIFFNESS.hi, room, room)
+        assert {high, off} <= {bus - room, bus + room, -room}
+    one, flux = 1 << PU.frac_bits, round(ROOM / FLUX.lsb)
+    for turn_d, turn_q, i_d in itertools.product((flux, -flux), (0, flux // 4), (one, -one)):
+        turned = motor_shaft.Inputs(turn_d, turn_q, i_d, 0, 0, 0, 0)
+        still = motor_shaft.Registers(0, 0, 0, 1, 0, 0)
+        assert motor_shaft.step(motor_shaft.State(), turned, still)[1][0] == -turn_q * i_d >> PU.frac_bits
+        turned = motor_shaft.Inputs(turn_d, turn_q, 0, i_d, 0, 0, 0)
+        assert motor_shaft.step(motor_shaft.State(), turned, still)[1][0] == turn_d * i_d >> PU.frac_bits
+
+
+@pytest.mark.parametrize("name", [*residual.NAMES, "drone_24v", "paper000", "brusa_hsm1"])
+def test_which_motors_differ_follows_from_their_data(name):
+    """Magnets 5 % weaker, R 30 % higher: not seen where the current makes most of the flux; docs/faults.md."""
+    drive = residual.drive_of(name)
+    least, m = residual.least_flagged(drive), drive.machine
+    of_current = max(m.inductance_d_h, m.inductance_q_h) * drive.current_limit_a / m.magnet_flux_wb
+    assert (least.magnets < 0.05, least.resistance < 0.3) == ((True, True) if of_current < 1.9 else (False, False))

@@ -4,8 +4,9 @@
 // One source for every set of generics: cosim/verilator.py writes ports.inc with a line
 //     PORT(name, width, is_signed)
 // for each port of the top, and defines CORE_CLOCK, the name of its clock, CORE_HAS_GATES where it has gates,
-// CORE_TAKES_SAMPLES where a sample comes from outside (a single block has neither), and CORE_SHOWS_VALIDS where it has
-// duty_valid and values_valid.  Functions name a port by its line number, from 0.
+// CORE_TAKES_SAMPLES where a sample comes from outside (a single block has neither), CORE_SHOWS_VALIDS where it has
+// duty_valid and values_valid, and CORE_SLEEPS, CORE_HAS_WITNESS for a text of sleeping.py.  Functions name a port by its
+// line number, from 0.
 //
 // A tick is one rising edge of the clock: inputs set before it are seen by it, outputs read after it are what the
 // registers hold from this edge on.
@@ -55,6 +56,7 @@ struct Core {
     VerilatedContext context;
     Vcore top{&context, "core"};
     int64_t clock = 0;       // ticks since construction
+    int64_t missed = 0;      // of them with a register that changed while it would have slept
     uint8_t reported = 0;    // gate word that the last run_period ended with
     const Port ports[sizeof(
 #define PORT(name, width, is_signed) "x"
@@ -73,12 +75,30 @@ struct Core {
 
     ~Core() { top.final(); }
 
+    // An input that is set wakes what sleeps between samples.
+    void wake() {
+#ifdef CORE_SLEEPS
+        top.core_wakes = 1;
+#endif
+    }
+
+    void set(int port, int64_t value) {
+        ports[port].set(value);
+        wake();
+    }
+
     void tick() {
         top.CORE_CLOCK = 1;
         top.eval();
         top.CORE_CLOCK = 0;
+#ifdef CORE_SLEEPS
+        top.core_wakes = 0;
+#endif
         top.eval();
         ++clock;
+#ifdef CORE_HAS_WITNESS
+        missed += top.core_missed;
+#endif
     }
 
     // Bits 0..2: upper gates of legs a, b, c; bits 3..5: lower gates.
@@ -97,7 +117,9 @@ void core_delete(Core* core) { delete core; }
 
 int64_t core_clock(const Core* core) { return core->clock; }
 
-void core_set(Core* core, int port, int64_t value) { core->ports[port].set(value); }
+int64_t core_missed(const Core* core) { return core->missed; }
+
+void core_set(Core* core, int port, int64_t value) { core->set(port, value); }
 
 int64_t core_get(const Core* core, int port) { return core->ports[port].get(); }
 
@@ -128,7 +150,7 @@ void core_trace(Core* core, int64_t ticks, const int32_t* ports, int64_t count, 
 void core_play(Core* core, int64_t ticks, const int32_t* given, int64_t inputs_count, const int64_t* inputs,
                const int32_t* seen, int64_t count, int64_t* values) {
     for (int64_t k = 0; k < ticks; ++k) {
-        for (int64_t j = 0; j < inputs_count; ++j) core->ports[given[j]].set(*inputs++);
+        for (int64_t j = 0; j < inputs_count; ++j) core->set(given[j], *inputs++);
         core->tick();
         for (int64_t j = 0; j < count; ++j) *values++ = core->ports[seen[j]].get();
     }
@@ -164,6 +186,7 @@ int64_t core_run_period(Core* core, int64_t most, int64_t sample_at, int32_t* cl
     while (k < most) {
         ++k;
 #ifdef CORE_TAKES_SAMPLES
+        if (k == sample_at) core->wake();
         top.sample_valid = k == sample_at;
 #endif
 #ifdef CORE_SHOWS_VALIDS

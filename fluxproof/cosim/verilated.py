@@ -15,7 +15,7 @@ from __future__ import annotations
 import argparse
 import ctypes
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +32,7 @@ _FUNCTIONS = {  # name: (result, arguments), as in verilated.cpp
     "core_new": (_CORE, []),
     "core_delete": (None, [_CORE]),
     "core_clock": (_LONG, [_CORE]),
+    "core_missed": (_LONG, [_CORE]),
     "core_set": (None, [_CORE, _INT, _LONG]),
     "core_get": (_LONG, [_CORE, _INT]),
     "core_eval": (None, [_CORE]),
@@ -56,7 +57,7 @@ class VerilatedCore:
     """One core with all inputs 0, before its first clock; as many as wanted may live side by side.
 
     ``top`` is the entity: the core, or the AXI top around it, which does not show the two valids; ``folder`` has
-    another library with the same ports.
+    another library with the same ports; ``rewrite`` is that of ``verilator.build``.
     """
 
     def __init__(
@@ -65,9 +66,10 @@ class VerilatedCore:
         rtl: Path = RTL,
         top: str = TOP,
         folder: Path | None = None,
+        rewrite: Callable[[str], str] | None = None,
     ):
         self._handle = None
-        folder = folder or build(dict(generics or {}), rtl, top)
+        folder = folder or build(dict(generics or {}), rtl, top, rewrite)
         self.ports = {p.name: p for p in top_ports(folder / f"{top}.v", rtl, top)}
         self.clock_name = clock_of(self.ports)
         self.inputs = tuple(name for name, p in self.ports.items() if p.is_input)
@@ -89,6 +91,11 @@ class VerilatedCore:
     def clock(self) -> int:
         """Ticks since the core was made."""
         return self._library.core_clock(self._handle)
+
+    @property
+    def missed(self) -> int:
+        """With the text of ``with_witness``: ticks that changed a register which would have slept."""
+        return self._library.core_missed(self._handle)
 
     @property
     def gate_word(self) -> int:

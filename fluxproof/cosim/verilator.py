@@ -18,6 +18,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from fluxproof.checkout import ROOT, RTL
+from fluxproof.cosim.sleeping import MISSED, WAKE
 from fluxproof.cosim.verilog import TOP, VerilogPort, conversion_key, convert, top_ports
 
 CACHE = ROOT / "build" / "verilated"
@@ -77,14 +78,16 @@ def locked(path: Path) -> Iterator[None]:
         yield
 
 
-def _defines(ports: Collection[VerilogPort]) -> list[str]:
-    """What verilated.cpp must know of a top with these ports."""
+def _defines(ports: Collection[VerilogPort], verilog: str) -> list[str]:
+    """What verilated.cpp must know of a top with these ports and this text."""
     names = {port.name for port in ports}
     valids = ["-DCORE_SHOWS_VALIDS"] if {"duty_valid", "values_valid"} <= names else []
     gates = ["-DCORE_HAS_GATES"] if {"gate_high", "gate_low", "sample_trigger"} <= names else []
     samples = ["-DCORE_TAKES_SAMPLES"] if "sample_valid" in {port.name for port in ports if port.is_input} else []
     trip = ["-DCORE_HAS_ASYNC"] if {"trip", "aresetn"} <= names else []  # io/power_stage
-    return [f"-DCORE_CLOCK={clock_of(names)}", *valids, *gates, *samples, *trip]
+    added = {"CORE_SLEEPS": WAKE, "CORE_HAS_WITNESS": MISSED}  # ports of the text that the VHDL does not have
+    sleeps = [f"-D{name}" for name, port in added.items() if port in verilog]
+    return [f"-DCORE_CLOCK={clock_of(names)}", *valids, *gates, *samples, *trip, *sleeps]
 
 
 def clock_of(names: Iterable[str]) -> str:
@@ -106,7 +109,7 @@ def compile_library(
     """
     verilator, _, root = find_verilator()
     compiler = _compiler()
-    defines = _defines(ports)
+    defines = _defines(ports, (folder / f"{top}.v").read_text())
     (folder / "ports.inc").write_text("".join(f"PORT({p.name}, {p.width}, {int(p.signed)})\n" for p in ports))
     names = ["--Mdir", "obj", "--prefix", "Vcore", "--top-module", top, f"{top}.v"]
     _run([verilator, *VERILATOR_FLAGS, *options, *names], folder)
@@ -143,11 +146,27 @@ def runtime_objects() -> list[str]:
     return [str(folder / f"{name}.o") for name in names]
 
 
-def build(generics: Mapping[str, int], rtl: Path = RTL, top: str = TOP) -> Path:
-    """The folder with libcore.so and ``top``.v for these generics, made if it is not there yet."""
+def build(
+    generics: Mapping[str, int],
+    rtl: Path = RTL,
+    top: str = TOP,
+    rewrite: Callable[[str], str] | None = None,
+) -> Path:
+    """The folder with libcore.so and ``top``.v for these generics, made if it is not there yet.
+
+    rewrite(text): another text with the same ports is compiled in place of the converted one (sleeping.py).
+    """
     verilog = convert(generics, ROOT / "build" / "verilog" / conversion_key(generics, rtl, top), rtl, top)
     # The text, not the VHDL, is what gets compiled: someone may be editing the VHDL just now.
-    return compiled(verilog.read_bytes(), rtl, top)
+    text = verilog.read_bytes()
+    if rewrite is None:
+        return compiled(text, rtl, top)
+    rewritten = rewrite(text.decode())
+
+    def change(work: Path) -> None:
+        (work / f"{top}.v").write_text(rewritten)
+
+    return compiled(text, rtl, top, rewritten, change)
 
 
 def compiled(

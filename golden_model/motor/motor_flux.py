@@ -31,6 +31,9 @@ DROP_BETA = (MOTOR_LEG.frac_bits - DROP_D) + 16 + CLOCKS_BITS - MOTOR_FLUX.frac_
 DROP_OUT = MOTOR_FLUX.frac_bits - FLUX.frac_bits
 BY_SQRT3 = SQRT3.value
 D_W = 25
+HIDDEN = (1 << DROP_OUT) - 1  # of the state, below the output
+# s_b - s_c, in LSB of what sqrt(3) multiplies, that move beta by HIDDEN: 6, -8 and 2 move it by one, by their rounding
+BACK = (591, *(6, -8, 2) * 10)
 
 
 class State(NamedTuple):
@@ -72,7 +75,10 @@ def bound(_v, _state):
 
 
 def stimuli(_rng, _config):
-    """From a start with either sign into both limits of the state, each component; drops that reach the leg's limit."""
+    """From a start with either sign into both limits of the state, each component; drops that reach the leg's limit.
+
+    From alpha's limit back by all bits that the output does not show: each of them moves the output.
+    """
     still = {p.name: 0 for p in BLOCK.inputs + BLOCK.registers}
     rows = []
     for psi in (FLUX.hi, FLUX.lo, 0):
@@ -81,10 +87,22 @@ def stimuli(_rng, _config):
             other = MOTOR_LEG.lo + MOTOR_LEG.hi - end
             rows.append(still | {"start": 1, "psi_start": psi, "leg_a": end})
             rows += [still | {"leg_a": end, "leg_b": other, "leg_c": other, "psi_start": psi}] * 3
+            rows.append(still | {"leg_b": sign * HIDDEN})
             rows += [still | {"leg_b": end, "leg_c": other}] * 3
             rows += [still | {"r_a": DROP_R.hi, "i_a": sign * PU.hi, "leg_a": other, "i_b": 1, "r_b": 1 << 14}] * 2
     for k in (-2, -1, 0, 1, 2):  # ties of the drop's rounding and of the difference's
         rows += [still | {"r_b": 1 << 14, "i_b": k}, still | {"leg_b": 16 + k}, still | {"leg_c": 16 + k}]
+    return rows
+
+
+def patient_stimuli(_rng, _config):
+    """Beta, which starts at zero, into both limits and back from them as alpha in `stimuli`."""
+    still = {p.name: 0 for p in BLOCK.inputs + BLOCK.registers}
+    most = ((1 << (D_W - 1)) - 1) << DROP_D  # the largest difference of two legs
+    rows = [still | {"start": 1}]
+    for sign, steps in ((1, 640), (-1, 1280)):
+        rows += [still | {"leg_b": sign * (most >> 1), "leg_c": -sign * (most >> 1)}] * steps
+        rows += [still | {"leg_c": 32 * sign * d} for d in BACK]
     return rows
 
 
@@ -119,4 +137,5 @@ BLOCK = Block(
     reference=reference,
     bound=bound,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

@@ -123,6 +123,10 @@ def stimuli(_rng, _config):
             rows += [still | {"hold": 1, "omega_set": trial}] * 3
             rows += [still | {"viscous": VISCOUS.hi, "k_j": INERTIA.hi, "load": -sign * FLUX.hi, "pole_pairs": 31}] * 3
             rows += [still | {"load": -sign * FLUX.hi, "k_j": INERTIA.hi, "coulomb": COULOMB.hi}] * 3
+        # Into a limit of the speed, and back by all bits that the output does not show: each of them moves it
+        rows.append(still | {"hold": 1, "omega_set": SET.hi if sign > 0 else SET.lo})
+        rows += [still | {"k_j": INERTIA.hi, "load": -sign * FLUX.hi}] * 3
+        rows += [still | {"k_j": 1 << DROP_J, "load": sign * ((1 << DROP_OMEGA) - 1)}, still]
         for lo in (FLUX.lo, FLUX.hi):
             row = {"turn_d": lo, "turn_q": -lo - 1, "i_d": PU.hi, "i_q": PU.lo, "cogging": sign * MOTOR_WAVE.hi}
             rows += [still | row | {"k_j": 12345678}, still | row | {"k_j": 255, "load": lo}]

@@ -13,6 +13,7 @@ from scripts.prove import (
     current,
     encoders,
     gates,
+    motor,
     narrowing,
     pipeline,
     protection,
@@ -24,7 +25,7 @@ from scripts.prove.proof import Proof
 def every_proof() -> tuple[Proof, ...]:
     """The whole catalogue."""
     written = (*gates.PROOFS, *core.PROOFS, *protection.PROOFS, *buses.PROOFS, *converters.PROOFS, *encoders.PROOFS)
-    written += (*cells.PROOFS, *current.PROOFS, *residual.PROOFS)
+    written += (*cells.PROOFS, *current.PROOFS, *residual.PROOFS, *motor.PROOFS)
     return (*written, *narrowing.proofs(), *pipeline.proofs())
 
 

@@ -7,6 +7,7 @@ Python sets the references and a load step and only reads: the loop is closed in
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -16,6 +17,7 @@ from fluxproof.checkout import DRIVES
 from fluxproof.cosim.closed_loop import gate_words
 from fluxproof.cosim.flat import FLAT
 from fluxproof.cosim.golden_clock import GoldenClock
+from fluxproof.cosim.sleeping import with_sleep
 from fluxproof.cosim.verilated import VerilatedCore
 from fluxproof.hil.registers import Scale, motor_registers, motor_scale, motor_tables
 from golden_model import fluxproof
@@ -24,6 +26,7 @@ from golden_model.motor import motor_model, motor_sensors, motor_shaft
 from golden_model.motor.motor_model import STEP
 from golden_model.registers import RegisterSet, registers
 from golden_model.units import from_si
+from studies.hil import golden as golden_loop
 from studies.hil.beside_plant import follow
 from studies.hil.drive import SERVO, SWITCHES
 from studies.hil.equal import write_tables
@@ -33,6 +36,7 @@ CHAIN, SHAFT = 40, 53  # clocks from a tick to its currents, to its angle
 CONVERSION = 13  # clocks from sample_trigger to sample_valid
 SPEED_RAD_S, LOAD_NM = 100.0, 0.1
 PERIODS = 300
+HELD = 200  # periods of a speed
 
 
 class Parts(NamedTuple):
@@ -104,7 +108,8 @@ class Run:
 
     words: np.ndarray
     observed: list[dict[str, int]]
-    seconds: float = 0.0
+    seconds: float = 0.0  # of processor time
+    missed: int = 0  # clocks that a witness found missing
 
 
 def references(of: Parts) -> dict[str, int]:
@@ -134,11 +139,11 @@ def golden_run(of: Parts, periods: int, load_at: int) -> Run:
     return Run(words[1:], observed)
 
 
-def rtl_run(of: Parts, golden: Run, load_at: int) -> Run:
-    """The RTL for as many clocks; observed values are those at the golden run's triggers."""
+def rtl_of(of: Parts, rewrite: Callable[[str], str]) -> VerilatedCore:
+    """The RTL after its reset, registers and tables loaded."""
     config = of.core.config
     generics = {"ADC_BITS": config.adc_bits, "POSITION_BITS": config.position_bits, "CARRIER_HALF": config.carrier_half}
-    core = VerilatedCore(generics, top=f"core_and_motor{FLAT}")
+    core = VerilatedCore(generics, top=f"core_and_motor{FLAT}", rewrite=rewrite)
     core.set_many(of.core.values._asdict())
     core.set_many({f"motor_{name}": value for name, value in {**of.motor._asdict(), **of.sensors._asdict()}.items()})
     core.set("motor_u_dc", of.scale.u_dc(of.drive.inverter.dc_bus_v))
@@ -146,13 +151,19 @@ def rtl_run(of: Parts, golden: Run, load_at: int) -> Run:
     write_tables(core, of.tables, "motor_")
     core.set("enable", 1)
     core.reset()
-    began, names = time.perf_counter(), ("gate_high", "gate_low", "sample_trigger")
+    return core
+
+
+def rtl_run(of: Parts, golden: Run, load_at: int, rewrite: Callable[[str], str] = with_sleep) -> Run:
+    """The RTL for as many clocks; observed values are those at the golden run's triggers."""
+    core = rtl_of(of, rewrite)
+    began, names = time.process_time(), ("gate_high", "gate_low", "sample_trigger")
     before = core.trace(load_at, names)
     core.set("motor_load", of.scale.load(LOAD_NM))
     after = core.trace(len(golden.words) - load_at, names)
-    seconds = time.perf_counter() - began
+    seconds = time.process_time() - began
     rows = np.concatenate([before, after])
-    return Run(rows[:, 0] + 8 * rows[:, 1], [core.get_many(golden.observed[-1])], seconds)
+    return Run(rows[:, 0] + 8 * rows[:, 1], [core.get_many(golden.observed[-1])], seconds, core.missed)
 
 
 def compare(periods: int) -> tuple[Run, Run]:
@@ -163,11 +174,46 @@ def compare(periods: int) -> tuple[Run, Run]:
     return golden, rtl_run(of, golden, load_at)
 
 
-def figures(_options) -> list[dict]:
+class Long(NamedTuple):
+    """Samples compared, values that differ, processor time of the RTL."""
+
+    samples: int
+    wrong: int
+    seconds: float
+
+
+def long_run(periods: int) -> Long:
+    """Every value of every sample of the RTL against the compiled loop of models, with speeds drawn again and again."""
+    of, rng = parts(), np.random.default_rng(53)
+    speeds = rng.uniform(-SPEED_RAD_S, SPEED_RAD_S, -(-periods // HELD)) * of.drive.machine.pole_pairs
+    omega = np.repeat([from_si("omega_ref", speed, of.drive) for speed in speeds], HELD)[:periods]
+    given = references(of)
+    asked = np.array([[*given.values(), 0]] * periods, np.int64)
+    asked[:, list(given).index("omega_ref")] = omega
+    u_dc = of.scale.u_dc(of.drive.inverter.dc_bus_v)
+    hil = golden_loop.Hil(of.core.values, of.core.config, of.motor, of.tables, of.sensors, u_dc)
+    _, observed = golden_loop.record(hil, asked, golden_loop.constant(of.motor, periods))
+    names = list(observed)
+    wanted = np.stack([observed[name] for name in names], axis=1)
+
+    core, wrong, most = rtl_of(of, with_sleep), 0, 4 * of.core.config.carrier_half
+    began = time.process_time()
+    core.clocks_until("sample_trigger", most)
+    for row, speed in enumerate(omega):
+        core.set("omega_ref_in", int(speed))
+        core.clocks_until("sample_trigger", most)
+        wrong += int((np.fromiter(core.get_many(names).values(), np.int64) != wanted[row]).sum())
+    return Long(periods, wrong, time.process_time() - began)
+
+
+def figures(options) -> list[dict]:
     golden, rtl = compare(PERIODS)
     wrong = int((golden.words != rtl.words).sum()) + int(golden.observed[-1] != rtl.observed[-1])
+    long = long_run(options.periods)
     return [
-        least("closed loop of core and motor in the RTL", PERIODS, PERIODS, "periods"),
-        most("its differences from the golden models, gates at every clock", wrong, 0, "differences"),
-        least("its rate in Verilator", PERIODS / rtl.seconds, 240, "periods/s"),
+        least("closed loop of core and motor in the RTL, gates at every clock", PERIODS, PERIODS, "periods"),
+        most("its differences from the golden models", wrong, 0, "differences"),
+        least("closed loop, every value of every sample", long.samples, options.periods, "periods"),
+        most("its differences from the golden models, values", long.wrong, 0, "differences"),
+        least("its rate in Verilator, processor time", PERIODS / rtl.seconds, 240, "periods/s"),
     ]

@@ -23,6 +23,7 @@ from fluxproof.plant import IMPOSED_SPEED, Machine
 from fluxproof.plant.sensors import Sensors
 from fluxproof.simulate.run import inverter_of, machine_of
 from golden_model.drive import Drive, load
+from golden_model.estimators.motor_residual import DROP_I, DROP_OMEGA, LEAST
 from golden_model.front_ends import Converters, Encoder
 from golden_model.registers import registers
 from golden_model.units import from_si, si_per_lsb
@@ -104,16 +105,49 @@ FAULTS = (
 )  # fmt: skip
 
 
-def until_flag(drive: Drive, fault: Fault) -> float:
-    """Time from the first sample to the flag [s]; infinite without one."""
+def steady(drive: Drive, fault: Fault) -> Result:
+    """Steady running with the fault from the first sample on."""
     described, n = machine_of(drive, imposed=True), round(STEADY_S / drive.sample_time_s)
     machine = dataclasses.replace(described, **fault.machine(described))
-    watched = registers(drive).values.residual_slow * si_per_lsb("omega_me", drive) / drive.machine.pole_pairs
-    speed = np.full(n, max(fault.speed * drive.machine.rated_speed_rad_s, 1.15 * watched))
-    i_q = np.full(n, fault.current * drive.machine.rated_current_a)
-    result = play(drive, machine, noisy(drive, SEED, **fault.sensors(drive)), speed, i_q)
-    flagged = np.flatnonzero(result.observed["motor_differs"])
+    omega, amperes = operating_point(drive, fault)
+    speed, i_q = np.full(n, omega / drive.machine.pole_pairs), np.full(n, amperes)
+    return play(drive, machine, noisy(drive, SEED, **fault.sensors(drive)), speed, i_q)
+
+
+def until_flag(drive: Drive, fault: Fault) -> float:
+    """Time from the first sample to the flag [s]; infinite without one."""
+    flagged = np.flatnonzero(steady(drive, fault).observed["motor_differs"])
     return flagged[0] * drive.sample_time_s if len(flagged) else math.inf
+
+
+class Least(NamedTuple):
+    """Smallest changes that the limits let through no longer, as shares of magnet flux and R."""
+
+    magnets: float
+    resistance: float
+
+
+def limit_v(drive: Drive, omega: float, amperes: float) -> float:
+    """Voltage that the mean residual may have at this electrical speed and current, from the registers."""
+    regs = registers(drive).values
+    speed, current = round(omega / si_per_lsb("omega_me", drive)), round(amperes / si_per_lsb("i_q", drive))
+    parts = regs.residual_min + (speed * regs.residual_w >> DROP_OMEGA) + (current * regs.residual_i >> DROP_I)
+    return parts * 2.0**-LEAST.frac_bits * drive.bases.flux_wb / drive.sample_time_s
+
+
+def operating_point(drive: Drive, fault: Fault) -> tuple[float, float]:
+    """Electrical speed, at least what is watched, and current of a fault."""
+    slow = registers(drive).values.residual_slow * si_per_lsb("omega_me", drive)
+    m = drive.machine
+    return max(fault.speed * m.rated_speed_rad_s * m.pole_pairs, 1.15 * slow), fault.current * m.rated_current_a
+
+
+def least_flagged(drive: Drive) -> Least:
+    """From the limit, at the operating points of FAULTS: magnets change the mean by delta psi omega, R by delta R i."""
+    (omega, amperes), (slow, rated) = (operating_point(drive, fault) for fault in FAULTS[:2])
+    m = drive.machine
+    magnets = limit_v(drive, omega, amperes) / (omega * m.magnet_flux_wb)
+    return Least(magnets, limit_v(drive, slow, rated) / (m.resistance_ohm * rated))
 
 
 def figures(options) -> list[dict]:

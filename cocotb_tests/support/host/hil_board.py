@@ -5,7 +5,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from cocotb_tests.support.host.rtl_board import RtlBoard
+from fluxproof.cosim.sleeping import with_sleep
 from fluxproof.hil.load import Word, load_words
 from fluxproof.plant import Inverter, Machine, Sensors
 from golden_model.formats import MOTOR_SPEED
@@ -13,21 +16,35 @@ from golden_model.io import motor_map
 from golden_model.io.register_map import OKAY
 from golden_model.motor.motor_model import STEP
 
+PACKET = 200  # clocks from a trigger in which the packet of its sample ends
+
 
 class HilBoard(RtlBoard):
     """``machine``, ``inverter``, ``sensors``: of the motor; its registers are loaded over the bus at the start."""
 
     top = "fluxproof_hil"
+    rewrite = staticmethod(with_sleep)
 
     def __init__(self, drive, machine: Machine, inverter: Inverter, sensors: Sensors):
         super().__init__(drive)
         self.map = motor_map.registers()
+        self.stream: list[np.ndarray] = []  # words of the telemetry
+        self.core.tick = self.listen
         self.load(load_words(drive, machine, inverter, sensors))
         self.turn_rad_s = 2.0 * math.pi * drive.core.clock_hz / STEP * MOTOR_SPEED.lsb
 
     def load(self, words: list[Word]) -> None:
         for name, value in words:
             assert self.write(self.map[name].address, value & 0xFFFFFFFF) == OKAY, name
+
+    def listen(self, n: int = 1) -> None:
+        """``n`` clocks, whose telemetry is kept."""
+        rows = self.core.trace(n, ("m_axis_tvalid", "m_axis_tdata"))
+        self.stream.append(rows[rows[:, 0] == 1, 1])
+
+    def capture(self) -> bytes:
+        """The stream as a DMA leaves it in memory."""
+        return np.concatenate(self.stream).astype("<u4").tobytes()
 
     def value(self, name: str) -> int:
         """A register of the motor."""
@@ -36,6 +53,7 @@ class HilBoard(RtlBoard):
 
     def run_period(self) -> None:
         self.speeds.append(self.value("motor_omega_m") * self.turn_rad_s)
+        self.listen(PACKET)
         spent = self.core.clock - self.began
         clocks, _, _ = self.core.run_period(self.limit)
         self.began = self.core.clock
