@@ -24,6 +24,7 @@ import numpy as np
 
 from golden_model.block import Block, Port
 from golden_model.common import ratio
+from golden_model.common.interpolation import between
 from golden_model.common.ratio import BITS, RATIO
 from golden_model.control.torque_correction import SHOWN
 from golden_model.fixed import Format
@@ -58,12 +59,6 @@ BLANK = np.zeros((2, SIZE), np.int64)
 
 
 @kernel
-def between(low, high, fraction):
-    """low + fraction*(high - low), the product floored; fraction U(0,COLUMN_BITS)."""
-    return low + (((high - low) * fraction) >> COLUMN_BITS)
-
-
-@kernel
 def place(part, spaces):
     """(point, fraction behind it) of a part U(0,16) of so many spaces between points."""
     at = part * spaces
@@ -76,19 +71,21 @@ def step_table(inputs, table):
     x = inputs
     row, down = place(x.flux_part, ROWS - 1)
     base = row * WORDS
-    top = max(0, between(table[0, base + COLUMNS], table[0, base + WORDS + COLUMNS], down))
+    top = max(0, between(table[0, base + COLUMNS], table[0, base + WORDS + COLUMNS], down, COLUMN_BITS))
     t, torque_limited = ratio.step((abs(x.torque_now) * x.torque_gain) >> PU_BITS, top, PU_W)
     column, along = place(t, COLUMNS - 1)
     at = base + column
     i_d = between(
-        between(table[0, at], table[0, at + 1], along),
-        between(table[0, at + WORDS], table[0, at + WORDS + 1], along),
+        between(table[0, at], table[0, at + 1], along, COLUMN_BITS),
+        between(table[0, at + WORDS], table[0, at + WORDS + 1], along, COLUMN_BITS),
         down,
+        COLUMN_BITS,
     )
     i_q = between(
-        between(table[1, at], table[1, at + 1], along),
-        between(table[1, at + WORDS], table[1, at + WORDS + 1], along),
+        between(table[1, at], table[1, at + 1], along, COLUMN_BITS),
+        between(table[1, at + WORDS], table[1, at + WORDS + 1], along, COLUMN_BITS),
         down,
+        COLUMN_BITS,
     )
     i_q = max(0, i_q)
     if x.torque_now < 0:
@@ -191,8 +188,8 @@ BLOCK = Block(
         Port("torque_max", PU, lo=0, doc="largest torque at this flux limit"),
         Port("torque_limited", BIT, doc="1: no more torque at this flux limit"),
     ),
-    latency=27,
-    interval=27,
+    latency=28,
+    interval=28,
     constants={"ROWS": ROWS, "WORDS": WORDS, "COLUMN_BITS": COLUMN_BITS},
     roms={"EXAMPLE_D": (PU, [int(v) for v in EXAMPLE[0]]), "EXAMPLE_Q": (PU, [int(v) for v in EXAMPLE[1]])},
     configs=({"EXAMPLE": 1}, {"EXAMPLE": 0}),

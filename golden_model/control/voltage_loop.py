@@ -50,7 +50,7 @@ def reference(v, state):
 
 
 def bound(v, _state):
-    """Floors of the radius, times twice its size at most, of the bracket and of the shown bits; the rounded increment."""
+    """Floors of the radius (times twice its size), of the bracket and of the shown bits; the rounded increment."""
     left = 2.0 * v["u_max"] * RATIO.lsb + 2.0 * PU.lsb
     return {"share": v["k_voltage"] * left + SHARE.lsb + RATIO.lsb}
 

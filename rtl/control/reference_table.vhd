@@ -5,7 +5,7 @@
 -- Each of two block RAMs holds a current of the table; table_word writes one word at every clock in which its bit 30 is
 -- set.  EXAMPLE = 1 fills them at power-up, for the bench.
 -- Formats: torque_gain U(1,16); flux_part and t U(0,16), of which the interpolation uses 10 bits; table words PU.
--- Latency: 27.  Interval: 27.  Rounding: floored; torque_max saturates.
+-- Latency: 28.  Interval: 28.  Rounding: floored; torque_max saturates.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -38,7 +38,6 @@ architecture rtl of reference_table is
   constant BITS    : positive := REFERENCE_TABLE_COLUMN_BITS;
 
   subtype word_t is signed(PU_W - 1 downto 0);
-  subtype product_t is signed(PU_W + 1 + BITS downto 0);
   type ram_t is array (0 to REFERENCE_TABLE_ROWS * REFERENCE_TABLE_WORDS - 1) of word_t;
 
   function power_up (d_axis : boolean) return ram_t is
@@ -52,12 +51,6 @@ architecture rtl of reference_table is
     return result;
   end function;
 
-  -- low + the floored product of a difference and a fraction, which lies between both words
-  function between (low : word_t; product : product_t) return word_t is
-  begin
-    return resize(low + shift_right(product, BITS), PU_W);
-  end function;
-
   signal ram_d : ram_t := power_up(true);
   signal ram_q : ram_t := power_up(false);
 
@@ -65,13 +58,11 @@ architecture rtl of reference_table is
   signal address        : unsigned(10 downto 0);
   signal word_d, last_d : word_t;  -- the word read, and the one before it
   signal word_q, last_q : word_t;
-  signal base_d, base_q : word_t;
-  signal low_d, high_d  : word_t;
-  signal low_q, high_q  : word_t;
-  signal next_d, next_q : word_t;
-  signal x_d, x_q       : signed(PU_W downto 0);  -- a difference of two words
+  signal a_d, b_d, y_d  : word_t;  -- ends of an interpolation, and the point between them
+  signal a_q, b_q, y_q  : word_t;
+  signal low_d, low_q   : word_t;  -- the currents of the lower row
+  signal rows           : std_logic;  -- between both rows, not between two words
   signal fraction       : unsigned(BITS - 1 downto 0);
-  signal p_d, p_q       : product_t;
   signal gain           : signed(PU_W - 1 downto 0);  -- torque_gain or 2 - torque_gain
   signal torque         : signed(PU_W downto 0);
   signal p_torque       : signed(2 * PU_W downto 0);
@@ -94,11 +85,25 @@ begin
   column    <= column_at(20 downto 16);
   along     <= column_at(15 downto 16 - BITS);
 
-  -- Stages 7 to 15: t = torque_gain*|torque_now|/top
+  -- Stages 8 to 16: t = torque_gain*|torque_now|/top
   torque_part : entity work.ratio
-    port map (clk => clk, rst => rst, in_valid => valid(6),
+    port map (clk => clk, rst => rst, in_valid => valid(7),
               dividend => asked, divisor => unsigned(top),
               out_valid => part_valid, ratio => part, full => torque_limited);
+
+  -- Between two words: stages 4 to 6, 20 to 22, 22 to 24;  between both rows: stages 25 to 27
+  rows     <= valid(24);
+  a_d      <= low_d when rows = '1' else last_d;
+  a_q      <= low_q when rows = '1' else last_q;
+  b_d      <= y_d when rows = '1' else word_d;
+  b_q      <= y_q when rows = '1' else word_q;
+  fraction <= along when valid(19) = '1' or valid(21) = '1' else down;
+
+  between_d : entity work.interpolation
+    port map (clk => clk, a => a_d, b => b_d, fraction => fraction, y => y_d);
+
+  between_q : entity work.interpolation
+    port map (clk => clk, a => a_q, b => b_q, fraction => fraction, y => y_q);
 
   -- The table: two block RAMs, written by software, read word by word
   process (clk)
@@ -116,19 +121,13 @@ begin
   end process;
 
   process (clk)
-    variable between_d : word_t;
-    variable between_q : word_t;
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
 
       last_d   <= word_d;
       last_q   <= word_q;
-      p_d      <= x_d * signed('0' & fraction);
-      p_q      <= x_q * signed('0' & fraction);
       p_torque <= torque * gain;
-      between_d := between(base_d, p_d);
-      between_q := between(base_q, p_q);
 
       -- Stages 1 to 3: torque_gain*|torque_now|
       if valid(0) = '1' then
@@ -149,69 +148,43 @@ begin
       if part_valid = '1' then
         address <= row & column;
       end if;
-      if valid(16) = '1' then
+      if valid(17) = '1' then
         address <= row & (column + 1);
       end if;
-      if valid(17) = '1' then
+      if valid(18) = '1' then
         address <= (row + 1) & column;
       end if;
-      if valid(18) = '1' then
+      if valid(19) = '1' then
         address <= (row + 1) & (column + 1);
       end if;
 
-      -- Between two words: stages 4, 19, 21;  between both rows: stage 24;  each in three clocks
-      if valid(3) = '1' or valid(18) = '1' or valid(20) = '1' then
-        base_d <= last_d;
-        base_q <= last_q;
-        x_d    <= resize(word_d, PU_W + 1) - last_d;
-        x_q    <= resize(word_q, PU_W + 1) - last_q;
-      end if;
-      if valid(23) = '1' then
-        base_d <= low_d;
-        base_q <= low_q;
-        x_d    <= resize(high_d, PU_W + 1) - low_d;
-        x_q    <= resize(high_q, PU_W + 1) - low_q;
-      end if;
-      fraction <= down;
-      if valid(18) = '1' or valid(20) = '1' then
-        fraction <= along;
-      end if;
-
-      -- Stage 6: top, not negative;  stages 7 to 9: torque_max = (2 - torque_gain)*top
-      if valid(5) = '1' then
-        top <= (others => '0');
-        if between_d >= 0 then
-          top <= between_d;
+      -- Stage 7: top, not negative;  stages 8 to 10: torque_max = (2 - torque_gain)*top
+      if valid(6) = '1' then
+        top <= y_d;
+        if y_d < 0 then
+          top <= (others => '0');
         end if;
       end if;
-      if valid(6) = '1' then
+      if valid(7) = '1' then
         torque <= resize(top, PU_W + 1);
         gain   <= signed(to_unsigned(2 ** 17, PU_W) - torque_gain);
       end if;
-      if valid(8) = '1' then
+      if valid(9) = '1' then
         torque_max <= signed('0' & p_torque(16 + PU_W - 2 downto 16));
         if p_torque(16 + PU_W - 1) = '1' then
           torque_max <= (PU_W - 1 => '0', others => '1');
         end if;
       end if;
 
-      -- Stages 21, 23: the currents of both rows;  stage 26: between them;  stage 27: the sign of i_q
-      if valid(20) = '1' then
-        low_d <= between_d;
-        low_q <= between_q;
-      end if;
+      -- Stage 23: the currents of the lower row;  stage 28: those between both rows, i_q with the torque's sign
       if valid(22) = '1' then
-        high_d <= between_d;
-        high_q <= between_q;
-      end if;
-      if valid(25) = '1' then
-        next_d <= between_d;
-        next_q <= between_q;
+        low_d <= y_d;
+        low_q <= y_q;
       end if;
       if valid(LATENCY - 1) = '1' then
-        i_d_table <= next_d;
-        i_q_table <= negated(next_q, torque_now(PU_W - 1));
-        if next_q < 0 then
+        i_d_table <= y_d;
+        i_q_table <= negated(y_q, torque_now(PU_W - 1));
+        if y_q < 0 then
           i_q_table <= (others => '0');
         end if;
       end if;

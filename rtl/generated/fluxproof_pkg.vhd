@@ -320,6 +320,9 @@ package fluxproof_pkg is
   -- input_filter: none: pins of a board
   constant INPUT_FILTER_LATENCY : positive := 1;
 
+  -- interpolation: none: docs/speed_range.md
+  constant INTERPOLATION_LATENCY : positive := 3;
+
   -- multiply_add: the sums of products in all equations
   constant MULTIPLY_ADD_LATENCY : positive := 3;
 
@@ -462,7 +465,7 @@ package fluxproof_pkg is
   constant POSITION_TRAJECTORY_TO_INTEGRAL : natural := 5;
 
   -- reference_table: none: docs/speed_range.md
-  constant REFERENCE_TABLE_LATENCY : positive := 27;
+  constant REFERENCE_TABLE_LATENCY : positive := 28;
   constant REFERENCE_TABLE_ROWS : natural := 64;
   constant REFERENCE_TABLE_WORDS : natural := 32;
   constant REFERENCE_TABLE_COLUMN_BITS : natural := 10;

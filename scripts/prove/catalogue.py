@@ -17,6 +17,7 @@ from scripts.prove import (
     pipeline,
     protection,
     residual,
+    weakening,
 )
 from scripts.prove.proof import Proof
 
@@ -24,7 +25,7 @@ from scripts.prove.proof import Proof
 def every_proof() -> tuple[Proof, ...]:
     """The whole catalogue."""
     written = (*gates.PROOFS, *core.PROOFS, *protection.PROOFS, *buses.PROOFS, *converters.PROOFS, *encoders.PROOFS)
-    written += (*cells.PROOFS, *current.PROOFS, *residual.PROOFS)
+    written += (*cells.PROOFS, *current.PROOFS, *residual.PROOFS, *weakening.PROOFS)
     return (*written, *narrowing.proofs(), *pipeline.proofs())
 
 

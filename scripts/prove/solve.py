@@ -63,8 +63,8 @@ def plant(fault: Fault, tree: Path) -> Path:
     return tree
 
 
-def with_spies(verilog: str, entity: str, spies: tuple[str, ...]) -> str:
-    """The module with each signal of ``spies`` as an additional output spy_NAME."""
+def with_spies(verilog: str, entity: str, spies: tuple[str, ...], prefix: str = "spy") -> str:
+    """The module with each signal of ``spies`` as an additional output PREFIX_NAME."""
     start = re.search(rf"^module {entity}\b", verilog, re.MULTILINE).start()
     head, body = verilog[:start], verilog[start:]
     ports, drivers = "", ""
@@ -72,8 +72,8 @@ def with_spies(verilog: str, entity: str, spies: tuple[str, ...]) -> str:
         found = re.search(rf"^  (?:wire|reg) (\[\d+:0\] )?{name};", body, re.MULTILINE)
         if found is None:
             raise BrokenProof(f"{entity} has no signal {name}, which its harness looks at")
-        ports += f",\n   output {found.group(1) or ''}spy_{name}"
-        drivers += f"  assign spy_{name} = {name};\n"
+        ports += f",\n   output {found.group(1) or ''}{prefix}_{name}"
+        drivers += f"  assign {prefix}_{name} = {name};\n"
     return head + _HEADER_END.sub(f"{ports});\n{drivers}", body, count=1)
 
 
@@ -142,6 +142,8 @@ def ask(
     except RuntimeError as error:
         raise BrokenProof(str(error)) from error
     macros = (*proof.macros, *(f"{key}={value}" for key, value in generics.items()))
+    if proof.seen:
+        verilog = with_spies(verilog, proof.entity, proof.seen, "seen")
     if lemmas and proof.spies:
         verilog = with_spies(verilog, proof.entity, proof.spies)
         macros += ("LEMMAS",)
