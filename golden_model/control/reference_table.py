@@ -35,6 +35,7 @@ ROWS, COLUMNS, WORDS = 64, 31, 32  # the word behind the columns is TOP
 SIZE = ROWS * WORDS
 COLUMN_BITS = 10  # fraction between two points
 PU_BITS, PU_HI, TWO = PU.frac_bits, PU.hi, 2 << SHOWN.frac_bits
+WILD = (7, 20, 21, 40)  # rows of random words in the example
 WRITE, SELECT, ADDRESS = 1 << 30, 1 << 29, 18  # bits of table_word: write; 0: i_d, 1: i_q; lowest bit of the address
 
 
@@ -49,7 +50,7 @@ def _example() -> np.ndarray:
             words[1, row * WORDS + column] = round(60000 * t * math.sqrt(min(1.0, flux + 0.1)))
         words[0, row * WORDS + COLUMNS] = round(50000 * min(1.0, 1.3 * flux))
     rng = np.random.default_rng(51)
-    for row in (7, 20, 21, 40):  # words that no motor's table has: any number must do
+    for row in WILD:  # words that no motor's table has: any number must do
         words[:, row * WORDS : (row + 1) * WORDS] = rng.integers(PU.lo, PU.hi + 1, (2, WORDS))
     return words
 
@@ -145,7 +146,7 @@ def possible(row, _config):
 
 
 def stimuli(rng, _config):
-    """Every row and column and both edges of each, ends of torque, flux limit and gain."""
+    """Every row and column and both edges of each, ends of torque, flux limit and gain; wild words."""
     rows = []
     for k in range(192):
         edge = -(-(k // 3 << BITS) // (ROWS - 1)) + k % 3 - 1
@@ -155,6 +156,11 @@ def stimuli(rng, _config):
         for torque in (0, 1, -1, PU.hi, PU.lo, 5, 49999, 50000, 50001):
             for gain in (1 << 15, 1 << 16, 3 << 15):
                 rows.append({"flux_part": flux_part, "torque_now": torque, "torque_gain": gain})
+    for k in range(240):  # between the words that no motor's table has, at both ends of the gain
+        row = WILD[k % len(WILD)] - k // 4 % 2
+        flux_part = int((row + rng.uniform(0, 1)) * (1 << BITS) / (ROWS - 1))
+        gain = (1 << 15, 1 << 16, 3 << 15)[k // 8 % 3]
+        rows.append({"flux_part": flux_part, "torque_now": int(rng.integers(-131072, 131072)), "torque_gain": gain})
     for _ in range(300):
         wide = int(2 ** rng.uniform(1, 17))
         row = {"flux_part": int(rng.integers(0, 65536)), "torque_now": int(rng.integers(-wide, wide))}
