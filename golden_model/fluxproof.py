@@ -194,7 +194,7 @@ Registers = namedtuple("Registers", list(REGISTERS))
 
 # Generic -> the instances that only a core with it has, the narrowest part first
 PARTS = {
-    "references": ("references", "table_current"),
+    "references": ("flux_circle", "ramp", "references", "voltage_regulator", "map_correction", "table_current"),
     "position_loop": ("position_regulator", "trajectory", "towards"),
     "residual": ("residual",),
 }
