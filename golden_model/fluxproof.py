@@ -17,12 +17,16 @@ from golden_model.control import (
     current_reference,
     dead_time_compensation,
     decoupling,
+    flux_limit,
     position_control,
     position_trajectory,
+    reference_table,
     regeneration_limit,
     speed_pi,
-    torque_reference,
+    torque_correction,
+    torque_ramp,
     voltage_limit,
+    voltage_loop,
 )
 from golden_model.control.dead_time_compensation import D_D, D_Q
 from golden_model.estimators import (
@@ -86,7 +90,9 @@ WIRING = {
     "trajectory": (position_trajectory, ("position_regulator",)),
     "speed_regulator": (speed_pi, ("speed_measurement", "current_circle", "position_regulator")),
     "regeneration": (regeneration_limit, ("speed_regulator", "bus_voltage")),
-    "references": (torque_reference, ("speed_regulator", "bus_voltage")),
+    "flux_circle": (flux_limit, ("speed_measurement", "bus_voltage")),
+    "ramp": (torque_ramp, ("speed_regulator",)),
+    "references": (reference_table, ("ramp", "flux_circle")),
     "current_regulators": (current_pi, ("rotor_frame", "regeneration", "current_circle")),
     "resistance": (winding_resistance, ("latch",)),
     "merged_flux": (flux_park, ("trig",)),
@@ -110,6 +116,8 @@ WIRING = {
     "flux_error": (delta_lambda, ("speed_inverse", "circle")),
     "compensation": (flux_compensation, ("flux_error",)),
     "torque_estimate": (torque, ("flux",)),
+    "voltage_regulator": (voltage_loop, ("circle",)),
+    "map_correction": (torque_correction, ("references", "voltage_regulator", "torque_estimate")),
     "inverter_loss": (v_dead_adaline, ("circle", "direction_functions")),
     "magnet_flux": (psi_adaline, ("circle", "direction_functions")),
     "towards": (direction_current, ("regeneration", "current_circle", "stator_frame", "trig")),
@@ -186,7 +194,7 @@ Registers = namedtuple("Registers", list(REGISTERS))
 
 # Generic -> the instances that only a core with it has, the narrowest part first
 PARTS = {
-    "references": ("references", "table_current"),
+    "references": ("flux_circle", "ramp", "references", "voltage_regulator", "map_correction", "table_current"),
     "position_loop": ("position_regulator", "trajectory", "towards"),
     "residual": ("residual",),
 }
@@ -289,7 +297,11 @@ class State(NamedTuple):
     i_q_table: int = 0
     torque_max: int = 0
     of_current_reference: current_reference.State = current_reference.State()
-    of_torque_reference: torque_reference.State = torque_reference.State()
+    of_torque_ramp: torque_ramp.State = torque_ramp.State()
+    of_voltage_loop: voltage_loop.State = voltage_loop.State()
+    of_torque_correction: torque_correction.State = torque_correction.State()
+    share: int = voltage_loop.SHARE_HI >> voltage_loop.DROP_SHARE
+    torque_gain: int = torque_correction.ONE >> torque_correction.DROP_GAIN
     regen_limited: int = 0
     of_regeneration_limit: regeneration_limit.State = regeneration_limit.State()
     # The position loop's part, last for the same reason
@@ -422,12 +434,12 @@ def step(state, sample, regs, config):
 @kernel
 def step_given(state, sample, regs, config, of_speed):
     """One control period with ``of_speed`` in place of the registers: (next state, Observed)."""
-    return step_table(state, sample, regs, config, of_speed, torque_reference.BLANK)
+    return step_table(state, sample, regs, config, of_speed, reference_table.BLANK)
 
 
 @kernel
 def step_table(state, sample, regs, config, of_speed, table):
-    """One control period with a torque table, (2, SIZE) as torque_reference: (next state, Observed)."""
+    """One control period with a torque table, (2, SIZE) as reference_table: (next state, Observed)."""
     x, r, c = sample, regs, config
     i_a, i_b, i_c, current_at_rail = current_conditioning.step(
         x.adc_a, x.adc_b, x.adc_c, r.offset_a, r.offset_b, r.offset_c, r.gain_a, r.gain_b, r.gain_c, r.two_sensors,
@@ -526,14 +538,20 @@ def step_table(state, sample, regs, config, of_speed, table):
         )  # fmt: skip
         after, e = estimation.step(state, given, seen, x, r, c)
 
-    references_state, (i_d_table, i_q_table, torque_max) = state.of_torque_reference, (0, 0, 0)
+    ramp_state, loop_state, correction_state = state.of_torque_ramp, state.of_voltage_loop, state.of_torque_correction
+    i_d_table, i_q_table, torque_max, share, torque_gain = 0, 0, 0, state.share, state.torque_gain
     if c.references:
-        asked = torque_reference.Inputs(
-            torque_ref=torque_ref, omega_me=omega_me, u_max=u_max, run=x.run, u_d=u_d, u_q=u_q, torque=e.torque
+        (flux_part,) = flux_limit.step(omega_me, u_max, state.share, r.k_flux)
+        loop_state, (share, calm) = voltage_loop.step(
+            state.of_voltage_loop, u_max, x.run, u_d, u_q, r.u_share, r.k_voltage, r.share_min
         )
-        references_state, (i_d_table, i_q_table, torque_max) = torque_reference.step_table(
-            state.of_torque_reference, asked, r, table
-        )
+        ramp_state, (torque_now,) = torque_ramp.step(state.of_torque_ramp, torque_ref, x.run, r.torque_step)
+        asked = reference_table.Inputs(flux_part=flux_part, torque_now=torque_now, torque_gain=state.torque_gain)
+        i_d_table, i_q_table, torque_max, torque_limited = reference_table.step_table(asked, table)
+        correction_state, (torque_gain,) = torque_correction.step(
+            state.of_torque_correction, torque_now, e.torque, omega_me, torque_limited, calm, x.run, r.k_torque,
+            r.omega_learn,
+        )  # fmt: skip
 
     trajectory_state, (position_ref, omega_ff, torque_ff, at_rest) = state.of_position_trajectory, (0, 0, 0, 0)
     if c.position_loop:
@@ -589,7 +607,8 @@ def step_table(state, sample, regs, config, of_speed, table):
         merge_known=after.merge_known, lambda_pi_d=after.lambda_pi_d, lambda_pi_q=after.lambda_pi_q,
         lambda_add_d=after.lambda_add_d, lambda_add_q=after.lambda_add_q, v_comp=after.v_comp, v_leg=after.v_leg,
         s_alpha=after.s_alpha, s_beta=after.s_beta, of_current_reference=table_current_state,
-        of_torque_reference=references_state, i_d_table=i_d_table, i_q_table=i_q_table, torque_max=torque_max,
+        of_torque_ramp=ramp_state, of_voltage_loop=loop_state, of_torque_correction=correction_state, share=share,
+        torque_gain=torque_gain, i_d_table=i_d_table, i_q_table=i_q_table, torque_max=torque_max,
         regen_limited=regen_limited, of_regeneration_limit=regeneration_state,
         of_position_control=position_state, of_position_trajectory=trajectory_state, position_ref=position_ref,
         omega_ff=omega_ff, torque_ff=torque_ff, at_rest=at_rest,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from golden_model.control.torque_reference import BLANK
+from golden_model.control.reference_table import BLANK
 from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError
 from golden_model.fluxproof import NEEDS, REGISTERS, Config, Registers
@@ -39,7 +39,7 @@ class RegisterSet(NamedTuple):
     values: Registers
     config: Config
     rows: tuple[Row, ...]
-    table: np.ndarray = BLANK  # words of the torque table, see torque_reference
+    table: np.ndarray = BLANK  # words of the torque table, see reference_table
 
 
 def registers(drive: Drive, flux=None) -> RegisterSet:

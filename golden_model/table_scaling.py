@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The SI values of torque_reference's registers, see docs/speed_range.md.
+"""The SI values of the registers of field weakening, see docs/speed_range.md.
 
 Voltage loop: d(u**2)/d(share) is 2*u_max**2, so k_voltage = w*T_s/(2*u_max**2) makes it cross over at w.  Torque
 correction: the torque follows torque_gain by torque_ref, so k_torque = w*T_s/torque**2 makes it cross over at w at the
@@ -24,7 +24,7 @@ def table_of(drive, flux=None) -> torque_table.TorqueTable:
 
 
 def references(drive, table):
-    """The registers of torque_reference and current_reference; ``table`` None: without a torque table, all zero."""
+    """The registers of the torque table and of what corrects it; ``table`` None: without a torque table, all zero."""
     c, m, b, t_s = drive.control, drive.machine, drive.bases, drive.sample_time_s
     on, volts = table is not None, base_keys(drive, "voltage_v")
     inverse = 1.0 / table.flux_wb[-1] if on else 0.0

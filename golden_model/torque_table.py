@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The table of torque_reference, computed offline: least current for a torque and a flux limit (docs/speed_range.md).
+"""The table of reference_table, computed offline: least current for a torque and a flux limit (docs/speed_range.md).
 
 Any machine whose flux linkage is a function of i_d and i_q >= 0: surface, interior, reluctance, by constant
 inductances or by a measured map.  For each flux limit and each torque, of all points that give the torque within the
@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golden_model.control.torque_reference import ADDRESS as ADDRESS_BIT
-from golden_model.control.torque_reference import COLUMNS, ROWS, SELECT, SIZE, WORDS, WRITE
+from golden_model.control.reference_table import ADDRESS as ADDRESS_BIT
+from golden_model.control.reference_table import COLUMNS, ROWS, SELECT, SIZE, WORDS, WRITE
 from golden_model.formats import PU
 
 Flux = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]  # (i_d, i_q) [A] -> (lambda_d, lambda_q) [Wb]

@@ -9,7 +9,7 @@
 -- ESTIMATORS = 0 leaves out the flux estimator and both Adalines: the decoupling then uses the current model alone, as
 -- with flux_mode 0, dead time is not compensated, and what they would show is zero.
 -- REFERENCES = 1 builds the torque table: with use_table the speed regulator's output is a torque, i_q_ext too, and the
--- table gives both current references at the flux limit of speed and bus voltage, see control/torque_reference.vhd.
+-- table gives both current references at the flux limit of speed and bus voltage, see control/reference_table.vhd.
 -- POSITION_LOOP = 1 builds a position loop over the speed loop and the trajectory that it follows, used with
 -- position_mode, see control/position_trajectory.vhd.
 -- RESIDUAL = 1 compares the motor with its description, see estimators/motor_residual.vhd.
@@ -249,16 +249,43 @@ begin
               out_valid => reference_valid, i_q_ref => torque_ref, speed_limited => o.speed_limited);
 
   by_table : if REFERENCES = 1 generate
-    signal i_d_table, i_q_table, i_q_circle, torque_max : signed(PU_W - 1 downto 0);
+    signal i_d_table, i_q_table, i_q_circle, torque_max, torque_now : signed(PU_W - 1 downto 0);
+    signal flux_part, share                                         : unsigned(15 downto 0);
+    signal torque_gain                                              : unsigned(16 downto 0);
+    signal flux_part_valid, references_valid                        : std_logic;
+    signal calm, torque_limited                                     : std_logic;
   begin
-    references : entity work.torque_reference
+    flux_circle : entity work.flux_limit
+      port map (clk => clk, rst => rst, in_valid => dc_valid,
+                omega_me => o.omega_me, u_max => o.u_max, share => share,
+                k_flux => settings.k_flux,
+                out_valid => flux_part_valid, flux_part => flux_part);
+
+    voltage_regulator : entity work.voltage_loop
+      port map (clk => clk, rst => rst, in_valid => dq_voltage_valid,
+                u_max => o.u_max, run => run, u_d => o.u_d, u_q => o.u_q,
+                u_share => settings.u_share, k_voltage => settings.k_voltage, share_min => settings.share_min,
+                out_valid => open, share => share, calm => calm);
+
+    ramp : entity work.torque_ramp
       port map (clk => clk, rst => rst, in_valid => reference_valid,
-                torque_ref => torque_ref, omega_me => o.omega_me, u_max => o.u_max, run => run, u_d => o.u_d,
-                u_q => o.u_q, torque => e.torque,
-                k_flux => settings.k_flux, u_share => settings.u_share, k_voltage => settings.k_voltage,
-                share_min => settings.share_min, k_torque => settings.k_torque, omega_learn => settings.omega_learn,
-                torque_step => settings.torque_step, table_word => settings.table_word,
-                out_valid => open, i_d_table => i_d_table, i_q_table => i_q_table, torque_max => torque_max);
+                torque_ref => torque_ref, run => run,
+                torque_step => settings.torque_step,
+                out_valid => open, torque_now => torque_now);
+
+    references : entity work.reference_table
+      port map (clk => clk, rst => rst, in_valid => flux_part_valid,
+                flux_part => flux_part, torque_now => torque_now, torque_gain => torque_gain,
+                table_word => settings.table_word,
+                out_valid => references_valid, i_d_table => i_d_table, i_q_table => i_q_table,
+                torque_max => torque_max, torque_limited => torque_limited);
+
+    map_correction : entity work.torque_correction
+      port map (clk => clk, rst => rst, in_valid => references_valid,
+                torque_now => torque_now, torque => e.torque, omega_me => o.omega_me,
+                torque_limited => torque_limited, calm => calm, run => run,
+                k_torque => settings.k_torque, omega_learn => settings.omega_learn,
+                out_valid => open, torque_gain => torque_gain);
 
     table_current : entity work.current_reference
       port map (clk => clk, rst => rst, in_valid => circle_valid,

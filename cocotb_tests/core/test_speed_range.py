@@ -14,8 +14,8 @@ from fluxproof.plant import IMPOSED_SPEED
 from fluxproof.print_registers import c_lines, load_list
 from golden_model import drive as drives
 from golden_model import torque_table
-from golden_model.control import current_limit, current_reference, torque_reference, voltage_limit
-from golden_model.control.torque_reference import BLANK, COLUMNS, ROWS, WORDS
+from golden_model.control import current_limit, current_reference, reference_table, voltage_limit
+from golden_model.control.reference_table import BLANK, COLUMNS, ROWS, WORDS
 from golden_model.formats import PU
 from golden_model.registers import registers
 from golden_model.units import to_si
@@ -54,8 +54,7 @@ def test_references_of_any_table_stay_in_the_current_circle():
     """Random words, torques, speeds: references are within i_max, and i_q has the torque's sign."""
     rng, i_max = np.random.default_rng(3), 30000
     table = rng.integers(PU.lo, PU.hi + 1, BLANK.shape)
-    state, circle, late = torque_reference.State(), current_limit.State(), current_reference.State()
-    regs = torque_reference.Registers(3 << 16, 60000, 4000, 20000, 4000, 5000, PU.hi, 0)
+    circle, late = current_limit.State(), current_reference.State()
     i_d_table = i_q_table = sign = before = 0
     for _ in range(3000):
         circle, (i_d, i_q_max) = current_limit.step(circle, i_d_table, i_max)
@@ -64,8 +63,8 @@ def test_references_of_any_table_stay_in_the_current_circle():
         assert i_q * before >= 0
         before = sign
         torque = int(rng.integers(-100000, 100000))
-        x = torque_reference.Inputs(torque, int(rng.integers(-131072, 131072)), 37000, 1, 0, 20000, 0)
-        state, (i_d_table, i_q_table, _) = torque_reference.step_table(state, x, regs, table)
+        x = reference_table.Inputs(int(rng.integers(0, 65536)), torque, int(rng.integers(1 << 15, 3 << 15)))
+        i_d_table, i_q_table, _, _ = reference_table.step_table(x, table)
         sign = 1 if torque >= 0 else -1
 
 
@@ -149,7 +148,7 @@ def test_registers_command_writes_the_table(tmp_path):
     loads = [w["value"] for w in load_list(SET) if w["name"] == "table_word"]
     ram = np.zeros_like(BLANK)
     for word in loads:
-        if word & torque_reference.WRITE:
+        if word & reference_table.WRITE:
             value = word & 0x3FFFF
             axis, address = (word >> 29) & 1, (word >> 18) & 0x7FF
             ram[axis, address] = value - (1 << 18) * (value >> 17)

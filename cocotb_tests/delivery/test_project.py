@@ -214,7 +214,7 @@ def test_cells_are_those_that_were_counted():
         assert cells == (row["lut"], row["dsp"])
     told = {  # page, its sentences on the blocks of a key
         "position_loop": ("position", r"`position_\w+` ([\d,]+) LUT,.*?(\d) DSP48"),
-        "references": ("speed_range", r"`torque_reference` alone, .*?: ([\d,]+) LUT, .*?(\d) DSP48"),
+        "references": ("speed_range", r"`\w+` (\d+) LUT, (\d) DSP48"),
         "residual": ("faults", r"The block takes ([\d,]+) LUT, .* (one) DSP48"),
         "ring_rows": ("telemetry", r"of 42 rows \| (\d+), \d+, (\d) "),
     }

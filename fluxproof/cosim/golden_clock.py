@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from golden_model import clocked, fluxproof
-from golden_model.control.torque_reference import BLANK
+from golden_model.control.reference_table import BLANK
 from golden_model.kernel import kernel
 
 SEEN = clocked.Seen._fields

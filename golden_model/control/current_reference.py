@@ -42,9 +42,7 @@ BLOCK = Block(
         Port("i_q_table", PU, doc="current reference of the table, q axis"),
         Port("i_q_max", PU, lo=0, doc="limit of the q axis, see current_limit"),
     ),
-    registers=(
-        Port("use_table", BIT, doc="1: current references from torque_reference's table; i_q_ext is then a torque"),
-    ),
+    registers=(Port("use_table", BIT, doc="1: current references from the torque table; i_q_ext is then a torque"),),
     outputs=(Port("i_q_circle", PU, doc="current reference of the table in the circle, q axis"),),
     state=State(),
     latency=1,

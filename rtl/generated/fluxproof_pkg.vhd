@@ -88,7 +88,7 @@ package fluxproof_pkg is
     k_u_max          : unsigned(RECIPROCAL_W - 1 downto 0);  -- radius of the voltage circle / bus voltage
     k_delay          : unsigned(RECIPROCAL_W - 1 downto 0);  -- angle of the delay in turns, per unit of speed
     i_max            : signed(PU_W - 1 downto 0);  -- limit of the current: radius of the circle of i_d and i_q references
-    use_table        : std_logic;  -- 1: current references from torque_reference's table; i_q_ext is then a torque
+    use_table        : std_logic;  -- 1: current references from the torque table; i_q_ext is then a torque
     position_mode    : std_logic;  -- 1: position control, over speed control
     position_kp      : unsigned(KP_W - 1 downto 0);  -- speed per turn of position error
     position_band    : unsigned(15 downto 0);  -- largest position error that is left at rest
@@ -109,11 +109,6 @@ package fluxproof_pkg is
     regen_start      : unsigned(DUTY_W - 1 downto 0);  -- bus voltage from which the braking current is limited
     regen_slope      : unsigned(15 downto 0);  -- braking current that a bus above it takes away, per voltage; 0: no limit
     k_flux           : unsigned(KP_W - 1 downto 0);  -- 1 over the flux linkage of the table's last row
-    u_share          : unsigned(U_MAX_W - 1 downto 0);  -- part of the voltage circle that the voltage loop aims at
-    k_voltage        : unsigned(KI_W - 1 downto 0);  -- gain of the voltage loop per sample
-    share_min        : unsigned(U_MAX_W - 1 downto 0);  -- least part of the flux limit that the voltage loop leaves
-    k_torque         : unsigned(KI_W - 1 downto 0);  -- gain of the torque correction per sample
-    omega_learn      : signed(PU_W - 1 downto 0);  -- the torque correction is held below this speed
     torque_step      : signed(PU_W - 1 downto 0);  -- largest change of the torque reference per sample
     table_word       : unsigned(30 downto 0);  -- a word of the torque table: bits 17-0 value, 28-18 address, 29 0 for i_d and 1 for i_q, 30 write
     kp_d             : unsigned(KP_W - 1 downto 0);  -- proportional gain, d axis
@@ -140,6 +135,11 @@ package fluxproof_pkg is
     flux_kp          : unsigned(16 downto 0);  -- proportional gain of the compensation
     flux_ki          : unsigned(RECIPROCAL_W - 1 downto 0);  -- integral gain of the compensation times the sample time
     delta_max        : unsigned(U_MAX_W - 1 downto 0);  -- limit of the compensation
+    u_share          : unsigned(U_MAX_W - 1 downto 0);  -- part of the voltage circle that the voltage loop aims at
+    k_voltage        : unsigned(KI_W - 1 downto 0);  -- gain of the voltage loop per sample
+    share_min        : unsigned(U_MAX_W - 1 downto 0);  -- least part of the flux limit that the voltage loop leaves
+    k_torque         : unsigned(KI_W - 1 downto 0);  -- gain of the torque correction per sample
+    omega_learn      : signed(PU_W - 1 downto 0);  -- the torque correction is held below this speed
     k_lp             : unsigned(19 downto 0);  -- weight of a new sample in the low-pass of Fig. 3
     eta_v            : unsigned(20 downto 0);  -- step of the V_dead Adaline, 18*eta
     gamma            : unsigned(16 downto 0);  -- proportional part of the compensation
@@ -320,11 +320,17 @@ package fluxproof_pkg is
   -- input_filter: none: pins of a board
   constant INPUT_FILTER_LATENCY : positive := 1;
 
+  -- interpolation: none: docs/speed_range.md
+  constant INTERPOLATION_LATENCY : positive := 3;
+
   -- multiply_add: the sums of products in all equations
   constant MULTIPLY_ADD_LATENCY : positive := 3;
 
   -- packet_fifo: none: recording of samples
   constant PACKET_FIFO_LATENCY : positive := 1;
+
+  -- ratio: none: docs/speed_range.md
+  constant RATIO_LATENCY : positive := 9;
 
   -- reciprocal: 001, section 5.2, U_dc processing: division by 2**n / m
   constant RECIPROCAL_LATENCY : positive := 21;
@@ -434,6 +440,12 @@ package fluxproof_pkg is
   constant DECOUPLING_LATENCY : positive := 2;
   constant DECOUPLING_DROP : natural := 16;
 
+  -- flux_limit: none: docs/speed_range.md
+  constant FLUX_LIMIT_LATENCY : positive := 13;
+  constant FLUX_LIMIT_REACH_BITS : natural := 17;
+  constant FLUX_LIMIT_DROP_REACH : natural := 17;
+  constant FLUX_LIMIT_DIVIDEND_W : natural := 24;
+
   -- position_control: none: docs/position.md
   constant POSITION_CONTROL_LATENCY : positive := 7;
   constant POSITION_CONTROL_SUM_W : natural := 38;
@@ -452,28 +464,13 @@ package fluxproof_pkg is
   constant POSITION_TRAJECTORY_TO_PU : natural := 17;
   constant POSITION_TRAJECTORY_TO_INTEGRAL : natural := 5;
 
-  -- regeneration_limit: none: protection of the bus, docs/faults.md
-  constant REGENERATION_LIMIT_LATENCY : positive := 1;
-  constant REGENERATION_LIMIT_SLOPE_W : natural := 16;
-  constant REGENERATION_LIMIT_DROP : natural := 8;
-
-  -- speed_pi: 001, section 5.3: speed regulator with limited current reference
-  constant SPEED_PI_LATENCY : positive := 5;
-  constant SPEED_PI_DROP_P : natural := 4;
-  constant SPEED_PI_DROP_I : natural := 12;
-  constant SPEED_PI_PROPORTIONAL_W : natural := 39;
-
-  -- torque_reference: none: docs/speed_range.md
-  constant TORQUE_REFERENCE_LATENCY : positive := 42;
-  constant TORQUE_REFERENCE_ROWS : natural := 64;
-  constant TORQUE_REFERENCE_WORDS : natural := 32;
-  constant TORQUE_REFERENCE_COLUMN_BITS : natural := 10;
-  constant TORQUE_REFERENCE_DROP_E : natural := 16;
-  constant TORQUE_REFERENCE_DROP_REACH : natural := 17;
-  constant TORQUE_REFERENCE_DROP_STEP : natural := 12;
-  constant TORQUE_REFERENCE_REACH_BITS : natural := 17;
-  type torque_reference_example_d_t is array (0 to 2047) of signed(17 downto 0);
-  constant TORQUE_REFERENCE_EXAMPLE_D : torque_reference_example_d_t := (  -- S(1,16)
+  -- reference_table: none: docs/speed_range.md
+  constant REFERENCE_TABLE_LATENCY : positive := 28;
+  constant REFERENCE_TABLE_ROWS : natural := 64;
+  constant REFERENCE_TABLE_WORDS : natural := 32;
+  constant REFERENCE_TABLE_COLUMN_BITS : natural := 10;
+  type reference_table_example_d_t is array (0 to 2047) of signed(17 downto 0);
+  constant REFERENCE_TABLE_EXAMPLE_D : reference_table_example_d_t := (  -- S(1,16)
     18x"393d2", 18x"39242", 18x"390b2", 18x"38f22", 18x"38d92", 18x"38c02", 18x"38a72", 18x"388e2",
     18x"38752", 18x"385c2", 18x"38432", 18x"382a2", 18x"38112", 18x"37f82", 18x"37df2", 18x"37c62",
     18x"37ad2", 18x"37942", 18x"377b2", 18x"37622", 18x"37492", 18x"37302", 18x"37172", 18x"36fe2",
@@ -731,8 +728,8 @@ package fluxproof_pkg is
     18x"3e700", 18x"3e570", 18x"3e3e0", 18x"3e250", 18x"3e0c0", 18x"3df30", 18x"3dda0", 18x"3dc10",
     18x"3da80", 18x"3d8f0", 18x"3d760", 18x"3d5d0", 18x"3d440", 18x"3d2b0", 18x"3d120", 18x"0c350"
   );
-  type torque_reference_example_q_t is array (0 to 2047) of signed(17 downto 0);
-  constant TORQUE_REFERENCE_EXAMPLE_Q : torque_reference_example_q_t := (  -- S(1,16)
+  type reference_table_example_q_t is array (0 to 2047) of signed(17 downto 0);
+  constant REFERENCE_TABLE_EXAMPLE_Q : reference_table_example_q_t := (  -- S(1,16)
     18x"00000", 18x"00291", 18x"00521", 18x"007b2", 18x"00a43", 18x"00cd3", 18x"00f64", 18x"011f5",
     18x"01486", 18x"01716", 18x"019a7", 18x"01c38", 18x"01ec8", 18x"02159", 18x"023ea", 18x"0267a",
     18x"0290b", 18x"02b9c", 18x"02e2d", 18x"030bd", 18x"0334e", 18x"035df", 18x"0386f", 18x"03b00",
@@ -991,8 +988,31 @@ package fluxproof_pkg is
     18x"0bb80", 18x"0c350", 18x"0cb20", 18x"0d2f0", 18x"0dac0", 18x"0e290", 18x"0ea60", 18x"00000"
   );
 
+  -- regeneration_limit: none: protection of the bus, docs/faults.md
+  constant REGENERATION_LIMIT_LATENCY : positive := 1;
+  constant REGENERATION_LIMIT_SLOPE_W : natural := 16;
+  constant REGENERATION_LIMIT_DROP : natural := 8;
+
+  -- speed_pi: 001, section 5.3: speed regulator with limited current reference
+  constant SPEED_PI_LATENCY : positive := 5;
+  constant SPEED_PI_DROP_P : natural := 4;
+  constant SPEED_PI_DROP_I : natural := 12;
+  constant SPEED_PI_PROPORTIONAL_W : natural := 39;
+
+  -- torque_correction: none: docs/speed_range.md
+  constant TORQUE_CORRECTION_LATENCY : positive := 6;
+  constant TORQUE_CORRECTION_DROP_STEP : natural := 12;
+
+  -- torque_ramp: none: docs/speed_range.md
+  constant TORQUE_RAMP_LATENCY : positive := 1;
+
   -- voltage_limit: 001, Fig. 1: decoupling at the regulators' output; limit of the space-vector modulation
   constant VOLTAGE_LIMIT_LATENCY : positive := 10;
+
+  -- voltage_loop: none: docs/speed_range.md
+  constant VOLTAGE_LOOP_LATENCY : positive := 13;
+  constant VOLTAGE_LOOP_DROP_E : natural := 16;
+  constant VOLTAGE_LOOP_DROP_STEP : natural := 12;
 
   -- current_front: none: front end of a board
   constant CURRENT_FRONT_LATENCY : positive := 1;

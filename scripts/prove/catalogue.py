@@ -18,6 +18,7 @@ from scripts.prove import (
     pipeline,
     protection,
     residual,
+    weakening,
 )
 from scripts.prove.proof import Proof
 
@@ -25,7 +26,11 @@ from scripts.prove.proof import Proof
 def every_proof() -> tuple[Proof, ...]:
     """The whole catalogue."""
     written = (*gates.PROOFS, *core.PROOFS, *protection.PROOFS, *buses.PROOFS, *converters.PROOFS, *encoders.PROOFS)
+<<<<<<< HEAD
     written += (*cells.PROOFS, *current.PROOFS, *residual.PROOFS, *motor.PROOFS)
+=======
+    written += (*cells.PROOFS, *current.PROOFS, *residual.PROOFS, *weakening.PROOFS)
+>>>>>>> speed51
     return (*written, *narrowing.proofs(), *pipeline.proofs())
 
 

@@ -25,7 +25,7 @@ def cell(name: str, says: str, entity: str, generics: dict[str, int], *faults: F
     )
 
 
-CELL, SUM = "common/multiply_add.vhd", "common/sum_of_products.vhd"
+CELL, SUM, POINT = "common/multiply_add.vhd", "common/sum_of_products.vhd", "common/interpolation.vhd"
 PROOFS = (
     cell(
         "multiply_add",
@@ -54,6 +54,16 @@ PROOFS = (
             SUM,
             "saturate(sum_3(SUM_W - 1 downto DROP), y'length)",
             "resize(sum_3(SUM_W - 1 downto DROP), y'length)",
+        ),
+    ),
+    cell(
+        "interpolation",
+        "interpolation gives a + fraction*(b - a), floored, which never lies beyond a or b: it does not wrap",
+        "interpolation",
+        {"WIDTH": 5, "BITS": 4},
+        Fault("difference wraps", POINT, "resize(b, WIDTH + 1) - a;", "resize(b - a, WIDTH + 1);"),
+        Fault(
+            "fraction taken as negative", POINT, "signed('0' & fraction_1)", "signed(fraction_1(BITS - 1) & fraction_1)"
         ),
     ),
 )

@@ -92,6 +92,17 @@ PROOFS = (
         Fault("dead time counted from two", GATES, "to_unsigned(1, 12)", "to_unsigned(2, 12)"),
     ),
     gate_proof(
+        "release",
+        "gates that switch stop at enable = 0 or a trip alone: a torque released above base speed leaves them on",
+        "RELEASE",
+        Fault(
+            "stopped by a refused setting",
+            GATES,
+            "state.running    <= enable and configured and not tripped_0;",
+            "state.running    <= enable and configured and good and not tripped_0;",
+        ),
+    ),
+    gate_proof(
         "trip_off",
         "every gate is off one clock after trip",
         "TRIP_OFF",

@@ -28,7 +28,7 @@ class Proof:
     property, its assumes are described by ``assumed``, its covers must be reachable under the assumptions.  ``spies``
     are signals of the entity that the harness gets as outputs spy_NAME if LEMMAS is defined: lemmas help induction and
     are proved with the property.  The faults are searched without lemmas, up to ``search_depth`` clocks from reset,
-    with ``search_generics``.
+    with ``search_generics``.  ``seen`` are signals that the harness gets as outputs seen_NAME, in the search as well.
     """
 
     name: str
@@ -41,6 +41,7 @@ class Proof:
     generics: Mapping[str, int] = field(default_factory=dict)
     macros: tuple[str, ...] = ()
     spies: tuple[str, ...] = ()
+    seen: tuple[str, ...] = ()
     assumed: str = "nothing"
     search_generics: Mapping[str, int] | None = None  # None: those of the proof
     search_depth: int = 20

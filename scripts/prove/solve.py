@@ -63,9 +63,12 @@ def plant(fault: Fault, tree: Path) -> Path:
     return tree
 
 
-def with_spies(verilog: str, entity: str, spies: tuple[str, ...]) -> str:
-    """The module with each signal of ``spies`` as an additional output spy_NAME; a memory as all its words."""
-    start = re.search(rf"^module {entity}\b", verilog, re.MULTILINE).start()
+def with_spies(verilog: str, entity: str, spies: tuple[str, ...], prefix: str = "spy") -> str:
+    """The module with each signal of ``spies`` as an additional output PREFIX_NAME; a memory as all its words."""
+    found = re.search(rf"^module {entity}\b", verilog, re.MULTILINE)
+    if found is None:
+        raise BrokenProof(f"the converted Verilog has no module {entity}")
+    start = found.start()
     head, body = verilog[:start], verilog[start:]
     ports, drivers = "", ""
     for name in spies:
@@ -73,13 +76,13 @@ def with_spies(verilog: str, entity: str, spies: tuple[str, ...]) -> str:
         memory = re.search(rf"reg \[(\d+):0\] {name}\[(\d+):0\]", body)
         if memory is not None:
             width, words = int(memory.group(1)) + 1, int(memory.group(2)) + 1
-            ports += f",\n   output [{width * words - 1}:0] spy_{name}"
-            drivers += f"  assign spy_{name} = {{{', '.join(f'{name}[{k}]' for k in reversed(range(words)))}}};\n"
+            ports += f",\n   output [{width * words - 1}:0] {prefix}_{name}"
+            drivers += f"  assign {prefix}_{name} = {{{', '.join(f'{name}[{k}]' for k in reversed(range(words)))}}};\n"
             continue
         if found is None:
             raise BrokenProof(f"{entity} has no signal {name}, which its harness looks at")
-        ports += f",\n   output {found.group(1) or ''}spy_{name}"
-        drivers += f"  assign spy_{name} = {name};\n"
+        ports += f",\n   output {found.group(1) or ''}{prefix}_{name}"
+        drivers += f"  assign {prefix}_{name} = {name};\n"
     return head + _HEADER_END.sub(f"{ports});\n{drivers}", body, count=1)
 
 
@@ -148,6 +151,8 @@ def ask(
     except RuntimeError as error:
         raise BrokenProof(str(error)) from error
     macros = (*proof.macros, *(f"{key}={value}" for key, value in generics.items()))
+    if proof.seen:
+        verilog = with_spies(verilog, proof.entity, proof.seen, "seen")
     if lemmas and proof.spies:
         verilog = with_spies(verilog, proof.entity, proof.spies)
         macros += ("LEMMAS",)

@@ -185,6 +185,17 @@ module formal_top (
   end
 `endif
 
+`ifdef RELEASE
+  // Gates that switch stop at enable = 0 or a trip alone: no reference, voltage or setting stops them.
+  reg was_running;
+  always @(posedge clk) was_running <= running;
+  always @(posedge clk) if (begun) begin
+    assert (!(running && tripped));
+    if (was_running && !was_cut) assert (running);
+    cover (was_running && !was_cut && !good && was_one);
+  end
+`endif
+
 `ifdef AT_THE_VALLEY
   always @(posedge clk) if (begun) begin
     if (high) assert (was_wanted);

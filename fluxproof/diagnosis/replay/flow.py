@@ -10,7 +10,7 @@ import types
 from collections import defaultdict
 
 from golden_model import estimation, fluxproof
-from golden_model.control.torque_reference import BLANK
+from golden_model.control.reference_table import BLANK
 from golden_model.fluxproof import outputs_of
 
 
