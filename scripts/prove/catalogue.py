@@ -26,11 +26,7 @@ from scripts.prove.proof import Proof
 def every_proof() -> tuple[Proof, ...]:
     """The whole catalogue."""
     written = (*gates.PROOFS, *core.PROOFS, *protection.PROOFS, *buses.PROOFS, *converters.PROOFS, *encoders.PROOFS)
-<<<<<<< HEAD
-    written += (*cells.PROOFS, *current.PROOFS, *residual.PROOFS, *motor.PROOFS)
-=======
-    written += (*cells.PROOFS, *current.PROOFS, *residual.PROOFS, *weakening.PROOFS)
->>>>>>> speed51
+    written += (*cells.PROOFS, *current.PROOFS, *residual.PROOFS, *motor.PROOFS, *weakening.PROOFS)
     return (*written, *narrowing.proofs(), *pipeline.proofs())
 
 

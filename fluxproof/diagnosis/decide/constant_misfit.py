@@ -53,16 +53,17 @@ def _in_pairs(view, cells, effects, constant) -> tuple[NamedEffect, ...]:
             columns[name] = keys[0], complex(np.nanmean(at_order(cells, cells.columns[name][keys[0]], 0.0)))
     found: dict[str, tuple[float, NamedEffect]] = {}
     for pair in combinations(columns, 2):
-        across, both = [columns[name][1] for name in pair], np.array([columns[name][1] for name in pair])
-        matrix = np.stack([both.real, both.imag])
+        across = [columns[name][1] for name in pair]
+        matrix = np.array([[x.real for x in across], [x.imag for x in across]])
         if not np.abs(np.linalg.det(matrix)) > ACROSS * abs(across[0] * across[1]):  # of one direction, or no column
             continue
         sizes = np.linalg.solve(matrix, [constant.real, constant.imag])
         named = [_sized(view, cells, n, {columns[n][0]: float(c)}, effects[n], 0j, constant)
                  for n, c in zip(pair, sizes, strict=True)]  # fmt: skip
-        if not all(o and is_usual(o.parameters, effects[o.name].plausible, view.nominal) for o in named):
+        usual = [o for o in named if o and is_usual(o.parameters, effects[o.name].plausible, view.nominal)]
+        if len(usual) < len(pair):
             continue
-        for one, c, column in zip(named, sizes, across, strict=True):
+        for one, c, column in zip(usual, sizes, across, strict=True):
             size = abs(c * column)
             if one.name not in found or size < found[one.name][0]:
                 found[one.name] = size, one

@@ -15,11 +15,13 @@ from fluxproof.diagnosis.plan.request import requests, wants_cold
 def next_recording(decision: Decision, progress=lambda text: None) -> tuple[Planned, ...]:
     """The operating points that separate the ambiguities of a decision."""
     basis = decision.basis
-    if basis is not None and basis.posterior is None:
+    if basis is None:
+        return ()
+    if basis.posterior is None:
         best = decision.best_fit
         likely = (tuple(e.name for e in best.effects),) if best is not None else ()
         return points_beside(basis.view, decision.ambiguity or likely)
-    if basis is None or not decision.ambiguity:
+    if not decision.ambiguity:
         return ()
     progress("choosing the next recording")
     setup = basis.posterior.setup
