@@ -40,7 +40,7 @@ from fluxproof.simulate.run import inverter_of
 from fluxproof.watch.answers import told
 from fluxproof.watch.commissioning import Page, Story, Watched
 from fluxproof.watch.curves import thinned
-from fluxproof.watch.explain import Explainer, Explanation
+from fluxproof.watch.explain import Explainer, Explanation, sizes_of
 from fluxproof.watch.live import Live, Look
 from fluxproof.watch.packets import Note, Packets
 from fluxproof.watch.page import Scene, curves, state_of, view
@@ -48,6 +48,7 @@ from fluxproof.watch.replay import LiveReplay
 from fluxproof.watch.responses import Responses, steps_in
 from fluxproof.watch.server import allowed, serve, token_for
 from fluxproof.watch.sinks import PlotJuggler
+from fluxproof.watch.sizes import Sizes
 from fluxproof.watch.source import Tcp, source_of
 from fluxproof.watch.trigger import GATES, LEVELS, NOTHING, REFERENCE, events, holds
 from golden_model import drive as drives
@@ -312,11 +313,20 @@ def test_page_in_a_browser(words, tmp_path):
         wrong[2, 11] ^= 4
         more(wrong)
         page.until(f"{TEXT}.includes('sample {off + 52}, signal i_d, bit 2')")
-        explainer.found.append(Explanation(off, "explained", "Dead time: 3.1 <V>"))
+        size = {"dead_time: v_dead_v": (3.1, 0.2, "V")}
+        explainer.found.append(Explanation(off, "explained", "Dead time: 3.1 <V>", size))
         page.until(f"{TEXT}.includes('explained: Dead time: 3.1 <V>')")
+        page.until("Bokeh.documents[0].get_model_by_name('size').value == 'dead_time: v_dead_v'")
 
         named = {name for _, name in page.names("button", "combobox", "spinbutton", "textbox")}
-        assert named >= {"Window [s]", "Hold", "Hold when", "Pre-trigger", "Export what is shown (Parquet)"}
+        assert named >= {
+            "Window [s]",
+            "Hold",
+            "Hold when",
+            "Pre-trigger",
+            "Size over time of",
+            "Export what is shown (Parquet)",
+        }
         assert all(named)
         focus_on(page, "Hold")
         page.key(" ")
@@ -432,6 +442,25 @@ def test_an_event_holds_the_picture_where_the_rows_before_it_are_seen():
     assert holds(row, 101, 0.5, 10) and not holds(row + 1, 101, 0.5, 10)
     assert holds(row - 9, 101, 0.5, 10) and not holds(row - 10, 101, 0.5, 10)
     assert set(LEVELS) <= set(curves(watched().look(0), DRIVE))
+
+
+def test_the_size_of_what_is_named_over_time():
+    """Each explanation that names the parameter is a point with two sigma; the page shows the one named last."""
+    parameters = {"resistance_ohm": {"value": 1.5, "sigma": 0.1, "unit": "ohm"},
+                  "slope": {"value": 0.0, "sigma": None, "unit": "1"}}  # fmt: skip
+    name, first = "resistance: resistance_ohm", sizes_of([{"name": "resistance", "parameters": parameters}])
+    assert first == {name: (1.5, 0.1, "ohm")}
+    seen, found = Sizes(DRIVE), [Explanation(1000, "no_mismatch", "")]
+    seen.renew(found)
+    assert not seen.plot.visible
+    found += [Explanation(n, "explained", "", {name: (r, 0.1, "ohm")}) for n, r in ((2000, 1.5), (4000, 2.2))]
+    seen.renew(found)
+    assert seen.plot.visible and seen.chosen.value == name
+    assert seen.source.data["y"] == [1.5, 2.2] and seen.source.data["high"] == pytest.approx([1.7, 2.4])
+    assert seen.source.data["x"] == pytest.approx([2000 * DRIVE.sample_time_s, 4000 * DRIVE.sample_time_s])
+    found.append(Explanation(5000, "explained", "", {"magnet_flux: magnet_flux_wb": (0.15, 0.01, "Wb")}))
+    seen.renew(found)  # what was chosen stays chosen
+    assert seen.source.data["y"] == [1.5, 2.2] and "magnet_flux: magnet_flux_wb" in seen.chosen.options
 
 
 def test_thinned_keeps_peaks():

@@ -5,14 +5,17 @@ own, so that neither the reader nor the page waits for it."""
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
 import tempfile
 import time
 from collections import deque
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from threading import Event
+from types import MappingProxyType
 from typing import NamedTuple
 
 from fluxproof.diagnosis.replay.telemetry import write_dump
@@ -28,11 +31,15 @@ KEPT = 100  # explanations, for their size over time
 
 
 class Explanation(NamedTuple):
-    """What the diagnosis says of the rows up to a sample."""
+    """What the diagnosis says of the rows up to a sample.
+
+    sizes: {"effect: parameter": (value, sigma, unit)} of what it names.
+    """
 
     counter: int
     verdict: str
     text: str
+    sizes: Mapping[str, tuple[float, float, str]] = MappingProxyType({})
 
 
 class Explainer:
@@ -85,4 +92,14 @@ class Explainer:
             return Explanation(counter, "none", lines[-1].replace(str(dump), "the last seconds"))
         data = json.loads(answer.read_text(encoding="utf-8"))
         took = time.monotonic() - began
-        return Explanation(counter, data["verdict"], f"{data['sentence']} ({took:.0f} s)")
+        return Explanation(counter, data["verdict"], f"{data['sentence']} ({took:.0f} s)", sizes_of(data["effects"]))
+
+
+def sizes_of(effects: Iterable[dict]) -> dict[str, tuple[float, float, str]]:
+    """{"effect: parameter": (value, sigma, unit)} of the effects of a diagnosis.json whose sizes are known."""
+    return {
+        f"{effect['name']}: {key}": (p["value"], p["sigma"], p["unit"])
+        for effect in effects
+        for key, p in effect["parameters"].items()
+        if p["sigma"] is not None and math.isfinite(p["sigma"])
+    }

@@ -20,6 +20,7 @@ from fluxproof.watch.explain import Explainer
 from fluxproof.watch.live import Live, Look
 from fluxproof.watch.responses import Responses
 from fluxproof.watch.sinks import scales_of, table
+from fluxproof.watch.sizes import Sizes
 from fluxproof.watch.trigger import CHOICES, NOTHING, events, holds
 from golden_model.drive import Drive
 from golden_model.estimators.flux_monitor import CONDITIONS
@@ -86,7 +87,7 @@ def view(doc: Any, scene: Scene) -> None:
     circle.line("x", "y", source=sources["limit"], color="#000000", name="limit")
     circle.scatter("x", "y", source=sources["voltage"], size=2, color="#d55e00", name="voltage")
     said, digital, why, flags, answers = (Div(width=WIDE - 10) for _ in range(5))
-    answered = Answers(drive)
+    answered, sizes = Answers(drive), Sizes(drive)
     window = Select(title="Window [s]", value="1", options=list(WINDOWS_S), name="window", width=80)
     hold = Toggle(label="Hold", name="hold")
     trigger = Select(title="Hold when", value=NOTHING, options=list(CHOICES), name="trigger", width=160)
@@ -104,6 +105,8 @@ def view(doc: Any, scene: Scene) -> None:
     def renew() -> None:
         said.text, digital.text = escape(live.told()), f"<b>{escape(live.replay.told())}</b>"
         why.text = _explained(scene.explainer)
+        if scene.explainer is not None:
+            sizes.renew(scene.explainer.found)
         if scene.responses is not None:
             answers.text = escape(scene.responses.problem) or answered.renew(scene.responses.latest)
         if hold.active or live.total < 2:
@@ -129,10 +132,10 @@ def view(doc: Any, scene: Scene) -> None:
         doc.add_next_tick_callback(save)
 
     export.on_click(ask_save)
-    controls = column(
-        row(window, hold, export), row(trigger, level, before), digital, said, flags, why, answers, circle, width=WIDE
-    )
-    left = column(*plots, row(*answered.plots.values(), sizing_mode="stretch_width"), sizing_mode="stretch_width")
+    said_of = (digital, said, flags, why, sizes.chosen, answers, circle)
+    controls = column(row(window, hold, export), row(trigger, level, before), *said_of, width=WIDE)
+    steps = row(*answered.plots.values(), sizing_mode="stretch_width")
+    left = column(*plots, sizes.plot, steps, sizing_mode="stretch_width")
     doc.add_root(row(left, controls, sizing_mode="stretch_width"))
     doc.add_root(carried_root(carried))
     doc.add_periodic_callback(renew, PICTURE_MS)
