@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 from fluxproof.diagnosis.ground.limits import head_of
 from fluxproof.diagnosis.ground.recording import RecordingError
@@ -17,11 +18,11 @@ def together(items) -> list[list]:
     Files that have a quantity in common are two recordings of one drive and stay apart.
     """
     groups: list[list] = []
-    held: list = []  # of each group: (axes, names of the quantities), None if it holds no matrices
+    held: list[Any] = []  # of each group: (axes, names of the quantities), None if it holds no matrices
     for item in items:
         found = _matrices(item)
         fits = [k for k, of in enumerate(held) if found and of and of[0] == found[0] and not of[1] & found[1]]
-        if fits:
+        if found and fits:
             groups[fits[0]].append(item)
             held[fits[0]] = found[0], held[fits[0]][1] | found[1]
         else:

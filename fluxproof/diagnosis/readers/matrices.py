@@ -153,8 +153,9 @@ def _starts(lines, k: int, separator, decimal) -> bool:
         return False
     if "\\" in corner:
         return True
-    ends = next((j for j in range(k, len(lines)) if not lines[j].strip()), len(lines))
-    return bool(_title(lines, k, separator)) and len(across) >= LEAST_PLAIN and ends - k <= LONGEST_PLAIN
+    below = lines[k : k + LONGEST_PLAIN + 1]
+    short = len(below) <= LONGEST_PLAIN or not all(map(str.strip, below))
+    return short and len(across) >= LEAST_PLAIN and bool(_title(lines, k, separator))
 
 
 def _title(lines, k: int, separator) -> str:
