@@ -39,6 +39,7 @@ from fluxproof.diagnosis.improve.flux_found import write_flux_map
 from fluxproof.diagnosis.improve.improve import to_write, write_improved
 from fluxproof.diagnosis.improve.untrimmed import given_trims, without_trims
 from fluxproof.diagnosis.loading.load import load_recording
+from fluxproof.diagnosis.loading.together import together as together_read
 from fluxproof.diagnosis.overlay.compare import closed_loop, is_worse
 from fluxproof.diagnosis.physics import Explained, explain, explained, known_effects
 from fluxproof.diagnosis.replay.digital import replay
@@ -138,11 +139,11 @@ def _listed(recordings) -> list:
 
 def _loaded(recordings, nominal, progress) -> list[Recording]:
     loaded, refused = [], []
-    for item in _listed(recordings):
+    for item, *beside in together_read(_listed(recordings)):
         if not isinstance(item, Recording):
             progress(f"reading {item}")
             try:
-                item = load_recording(Path(item), nominal)
+                item = load_recording(Path(item), nominal, *beside)
             except RecordingError as error:
                 if not Path(item).is_file():  # a wrong name is not a bad part
                     raise

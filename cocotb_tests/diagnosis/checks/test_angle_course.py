@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.recordings.from_equations import T, made, nominal_of
-from fluxproof.diagnosis.checks import check_recording
+from fluxproof.diagnosis.checks import angle_course, check_recording
 from fluxproof.diagnosis.ground.recording import from_columns
 
 DEGREE, PAIRS = np.pi / 180.0, 4
@@ -106,3 +106,12 @@ def test_a_lost_sample_is_no_slip(nominal):
 def test_an_eccentric_encoder_is_left_to_the_catalogue(nominal):
     found, _, _ = checked(nominal, lambda angle: 5.0 * DEGREE * np.sin(angle / PAIRS))
     assert found == []
+
+
+def test_a_course_between_bins_is_that_of_their_means():
+    """Means over a bin weaken an order, as a line between them does: a fifth of the fifth order would stay."""
+    bins, fine = angle_course.BINS, 40
+    theta = (np.arange(bins * fine) + 0.5) * 2 * np.pi / (bins * fine)
+    course = 0.1 * np.cos(theta + 0.3) - 0.05 * np.sin(4 * theta) + 0.05 * np.cos(5 * theta + 1.0)
+    waves = np.fft.rfft(course.reshape(bins, fine).mean(axis=1))
+    np.testing.assert_allclose(angle_course._between(waves, theta), course, atol=1e-4)

@@ -255,6 +255,52 @@ def test_the_highest_step_of_a_plan_is_no_limit(tmp_path, nominal):
         assert not {"current_limit", "power_limit"} & set(codes(recording)), name
 
 
+def warmed(way, n=3000, step_s=0.5):
+    """A log of a winding that 4 A warm by 60 K above its housing, and that by 60 K, under a protection or a plan."""
+    rng = np.random.default_rng(9)
+    t, most, temp = np.arange(n) * step_s, np.full(n, 4.0), np.full(n, 25.0)
+    over = housing = 0.0
+    for k in range(1, n):
+        most[k] = way(t[k], temp[k - 1])
+        heat = 60.0 * (most[k] / 4.0) ** 2
+        over += step_s / 30.0 * (heat - over)
+        housing += step_s / 300.0 * (heat - housing)
+        temp[k] = 25.0 + over + housing
+    i_q, omega = most + 0.01 * rng.normal(size=n), 200.0 + 100.0 * np.sin(t / 9.0)
+    table = {"t": t, "i_d": 0 * t, "i_q": i_q, "omega_e": omega, "temp_winding": np.round(temp, 1)}
+    table |= {"u_d_ref": -omega * L_Q * i_q, "u_q_ref": R * (1 + 0.0039 * (temp - 20)) * i_q + omega * PSI}
+    return table | {"u_dc": np.full(n, BUS)}
+
+
+@pytest.mark.parametrize(
+    ("way", "after"),
+    [
+        (lambda t, temp: 4.0 * np.clip((130.0 - temp) / 40.0, 0.0, 1.0), 3.134),  # 120 x^2 = 105 - 40 x
+        (lambda t, temp: 4.0 * np.clip((92.0 - temp) / 4.0, 0.0, 1.0), 2.923),  # 120 x^2 = 67 - 4 x
+    ],
+)
+def test_a_current_that_is_reduced_for_the_temperature_is_told(tmp_path, nominal, way, after):
+    recording = load(tmp_path, nominal, warmed(way))
+    (problem,) = [p for p in recording.problems if p.code == "temperature_limit"]
+    assert problem.action == "rows used" and recording.usable.all()
+    stated = [float(problem.message.split(word)[1].split()[0]) for word in ("temperature, from ", "A to ")]
+    assert stated == pytest.approx([4.0, after], rel=0.03)
+
+
+@pytest.mark.parametrize(
+    "plan",
+    [
+        lambda t, temp: 4.0,
+        lambda t, temp: 4.0 if t < 150.0 else 3.0,
+        lambda t, temp: 4.0 - np.clip((t - 10.0) / 60.0, 0.0, 1.0),  # early: the winding warms on at 3 A
+        lambda t, temp: 4.0 - np.clip((t - 600.0) / 200.0, 0.0, 1.0),  # late: it cools
+        lambda t, temp: 4.0 - np.clip(t / 1200.0, 0.0, 1.0),
+    ],
+)
+def test_a_plan_that_lowers_the_current_is_no_limit_of_temperature(tmp_path, nominal, plan):
+    assert "temperature_limit" not in codes(load(tmp_path, nominal, warmed(plan)))
+
+
 def test_a_speed_in_counts_a_second_is_refused(tmp_path, nominal):
     table = dq_made()
     recording = load_recording(write(tmp_path / "r.csv", table | {"omega_e": 8192.0 * table["omega_e"]}), nominal)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import sys
 import time
 
@@ -14,7 +15,9 @@ import pytest
 from cocotb_tests.support.recordings.from_equations import as_text, codes, dump, made, nominal_of, write, write_mat73
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import COLUMNS, RecordingError
+from fluxproof.diagnosis.loading.early import refuse_early
 from fluxproof.diagnosis.loading.load import load_recording
+from fluxproof.diagnosis.loading.together import together
 from fluxproof.diagnosis.readers import read_table
 from fluxproof.diagnosis.readers.grids import flat
 
@@ -256,6 +259,81 @@ def test_square_matrices_with_vectors_do_not_tell_their_axes(tmp_path, nominal):
     )
     with pytest.raises(RecordingError, match="both axes as matrices too"):
         load_recording(tmp_path / "m.mat", nominal)
+
+
+AXES_OF_TEXT = r"omega_e [rad/s] \ i_q [A]"
+
+
+def _as_text(omega, i_q, matrices, separator=";", decimal=",", corner=AXES_OF_TEXT) -> str:
+    """Matrices {title: (speeds, currents)} as a bench exports them, one below the other."""
+
+    def line(first, values):
+        return separator.join([first, *(f"{x:.17g}".replace(".", decimal) if x == x else "" for x in values)])
+
+    lines = []
+    for title, matrix in matrices.items():
+        rows = [line(f"{w:.17g}".replace(".", decimal), row) for w, row in zip(omega, matrix, strict=True)]
+        lines += ["", title, line(corner, i_q), *rows]
+    return "\n".join(["bench 3", *lines, ""])
+
+
+def _mapped():
+    omega, i_q = np.linspace(50.0, 500.0, 4), np.array([0.0, 1.0, 2.5, 4.0])
+    w, i = np.meshgrid(omega, i_q, indexing="ij")
+    matrices = {"# u_q_ref [mV]": 1e3 * (1.5 * i + 0.165 * w), "u_d_ref [V]": -0.016 * w * i, "i_d": 0.0 * i}
+    matrices["u_d_ref [V]"][3, 3] = np.nan  # not reached
+    return omega, i_q, matrices
+
+
+@pytest.mark.parametrize(("separator", "decimal"), [(";", ","), ("\t", "."), (",", ".")])
+def test_matrices_in_text_are_operating_points(tmp_path, nominal, separator, decimal):
+    omega, i_q, matrices = _mapped()
+    path = tmp_path / "map.csv"
+    path.write_text(_as_text(omega, i_q, matrices, separator, decimal))
+    recording = load_recording(path, nominal)
+    assert recording.points and len(recording) == 15
+    assert any("1 of 16 points have an empty cell" in note for note in recording.meta["notes"])
+    np.testing.assert_allclose(recording["omega_e"], np.repeat(omega, 4)[:15])
+    np.testing.assert_allclose(recording["i_q"], np.tile(i_q, 4)[:15])
+    np.testing.assert_allclose(recording["u_q_ref"], 1e-3 * matrices["# u_q_ref [mV]"].ravel()[:15])
+
+
+def test_matrices_of_several_files_are_one_recording(tmp_path, nominal):
+    omega, i_q, matrices = _mapped()
+    paths = []
+    for k, (title, matrix) in enumerate(matrices.items()):
+        paths.append(tmp_path / f"{k}.csv")
+        paths[-1].write_text(_as_text(omega, i_q, {title: matrix}))
+    other = tmp_path / "other.csv"
+    other.write_text(_as_text(omega + 1.0, i_q, matrices))
+    groups = together([*paths[:2], other, paths[2], paths[0]])
+    assert groups == [paths, [other], [paths[0]]]
+    recording = load_recording(paths[0], nominal, *paths[1:])
+    assert len(recording) == 15 and {"i_d", "u_d_ref", "u_q_ref"} <= set(recording.columns)
+    with pytest.raises(RecordingError, match="missing i_d"):
+        load_recording(paths[0], nominal)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda s: s.replace(AXES_OF_TEXT, "rpm"), r"4: a matrix whose corner 'rpm' does not name both axes; 'DOWN"),
+        (lambda s: s.replace("u_d_ref [V]\n", "\n"), r"a matrix without a line above that names its quantity"),
+        (lambda s: s.replace("\n500;", "\n501;", 1), r"'u_d_ref \[V\]' over other axes than 'u_q_ref \[mV\]'"),
+        (lambda s: s.replace("\n500;", "\n500;1;1;1;", 1), r"8: 8 fields; 5 expected as in the axis above"),
+        (lambda s: re.sub(r"\n50;[^;]*", "\n50;n.a.", s, count=1), r"5: field 2: 'n\.a\.' is not a number"),
+        (lambda s: s + "\n7;8;9\n", r"a row of numbers outside a matrix"),
+        (lambda s: s.replace("i_d\n", "u_d_ref [V]\n"), r"u_d_ref \[V\] twice"),
+        (lambda s: s.replace("u_q_ref [mV]", "torque [Nm]"), r"u_q_ref"),
+    ],
+)  # fmt: skip
+def test_what_is_a_matrix_only_in_part_is_refused_with_its_line(tmp_path, nominal, change, words):
+    path = tmp_path / "map.csv"
+    path.write_text(change(_as_text(*_mapped())))
+    with pytest.raises(RecordingError, match=words):
+        load_recording(path, nominal)
+    with pytest.raises(RecordingError, match=words):
+        refuse_early([path], nominal.path)
 
 
 def test_phases_in_one_array_are_no_matrix_over_two_axes():

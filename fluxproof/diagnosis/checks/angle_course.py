@@ -91,14 +91,24 @@ def _uneven(recording, nominal, flux: Complex, current: Complex) -> None:
     alike = min(np.real(np.vdot(x, mean)) / (np.linalg.norm(x) * np.linalg.norm(mean) + 1e-30) for x in shapes)
     if np.sqrt(np.sum(rms[list(SECTORS)] ** 2)) < UNEVEN * DEGREE or alike < LIKE:
         return
-    shape = np.fft.irfft(mean, BINS)
-    centres = (np.arange(BINS) + 0.5) * 2 * np.pi / BINS
-    turn(recording, -np.interp(np.mod(recording["theta_e"], 2 * np.pi), centres, shape, period=2 * np.pi))
+    shape = _between(mean, np.linspace(0.0, 2 * np.pi, 10 * BINS))
+    turn(recording, -_between(mean, recording["theta_e"]))
     message = (
         f"the angle is uneven within the electrical turn, by {shape.min() / DEGREE:.3g} to {shape.max() / DEGREE:.3g} "
         "degrees electrical and alike in all turns: edges of Hall sensors, or what is interpolated between them"
     )
     recording.problems.append(Problem("angle_uneven", message, "theta_e", 0, len(flux), "corrected"))
+
+
+def _between(waves, theta) -> np.ndarray:
+    """The course at angles (n,) from the spectrum of its means over BINS, each of which weakens an order k by sinc."""
+    order = np.arange(1, BINS // 2)
+    whole = waves[order] / np.sinc(order / BINS) * np.exp(-1j * order * np.pi / BINS)  # from the middle of a bin
+    unit, turned, course = np.exp(1j * theta), np.ones(len(theta), complex), np.zeros(len(theta))
+    for wave in whole:
+        turned *= unit
+        course += 2.0 / BINS * np.real(wave * turned)
+    return course
 
 
 def _step(recording, flux, change) -> bool:

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 from fluxproof.diagnosis.ground.limits import head_of
 from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.ingest.columns import plan_columns
-from fluxproof.diagnosis.readers import text
+from fluxproof.diagnosis.readers import matrices, text
 from fluxproof.diagnosis.readers.packed import refuse_packed
 from fluxproof.diagnosis.readers.sniff import sniff
 from fluxproof.diagnosis.readers.table import chosen, repeated
@@ -55,16 +55,24 @@ def _refuse_columns(path: Path, nominal) -> None:
     if path.suffix.lower() not in text.SUFFIXES or not text.matches(head, path):
         return
     try:
-        layout = sniff(path)
+        units, twice, where = _header(head, path)
     except RecordingError:
         raise
     except Exception:  # whatever it is, the reader says it in full
         return
-    units = {name: unit for name, unit in zip(layout.names, layout.units, strict=True)}
     try:
-        chosen(units, lambda names: plan_columns(names, nominal, path).wanted(), path, repeated(layout.names),
-               f":{layout.first}")  # fmt: skip
+        chosen(units, lambda names: plan_columns(names, nominal, path).wanted(), path, twice, where)
     except RecordingError as error:
         raise error if escaped(path) in str(error) else RecordingError(f"{path}: {error}") from None
     except Exception:  # a value of [columns] of another type than a name or a table
         return
+
+
+def _header(head: bytes, path: Path) -> tuple[dict[str, str], list[str], str]:
+    """({name: unit} of a text's columns, names that occur twice, ":LINE" of the header)."""
+    if matrices.matches(head, path):
+        names = matrices.names_of(path)
+        return dict.fromkeys(names, ""), repeated(names), ""
+    layout = sniff(path)
+    units = {name: unit for name, unit in zip(layout.names, layout.units, strict=True)}
+    return units, repeated(layout.names), f":{layout.first}"

@@ -33,22 +33,23 @@ from fluxproof.diagnosis.readers import read_table
 from fluxproof.diagnosis.readers.table import Table, shown
 
 
-def load_recording(path, nominal) -> Recording:
+def load_recording(path, nominal, *beside) -> Recording:
     """The checked recording of a file in canonical form; RecordingError for unusable input.
 
-    path: a file in any format of diagnosis/readers; nominal: Nominal, with its [columns].
+    path: a file in any format of diagnosis/readers; nominal: Nominal, with its [columns]; beside: further files of the
+    same matrices (together.py).
     """
-    recording = _checked(Path(path), nominal)
+    recording = _checked(Path(path), nominal, *beside)
     if doubtful(recording):
         for restated in alternatives(recording, nominal):
-            other = _checked(Path(path), restated.of(nominal))
+            other = _checked(Path(path), restated.of(nominal), *beside)
             if fits(other, restated.of(nominal), restated):
                 other.meta["restated"] = restated
                 return other
     return recording
 
 
-def _checked(path: Path, nominal) -> Recording:
+def _checked(path: Path, nominal, *beside) -> Recording:
     """The recording of a file after all checks."""
     plans: list[Plan] = []
 
@@ -56,7 +57,7 @@ def _checked(path: Path, nominal) -> Recording:
         plans.append(plan_columns(names, nominal, path))
         return plans[-1].wanted()
 
-    table = read_table(path, select)
+    table = read_table(path, select, *beside)
     recording = _recording(path, table, plans[-1], nominal)
     check_recording(recording, nominal)
     return recording

@@ -31,8 +31,11 @@ def readers() -> list:
     return sorted((m for m in modules if hasattr(m, "read")), key=lambda m: m.FORMAT == "text")
 
 
-def read_table(path, select: Select | None = None) -> Table:
-    """The file's columns; RecordingError names the file and what was expected."""
+def read_table(path, select: Select | None = None, *beside) -> Table:
+    """The file's columns; RecordingError names the file and what was expected.
+
+    beside: further files with matrices over the same axes.
+    """
     path = Path(path)
     reader = _reader_of(path, head_of(path))
     for library in reader.LIBRARIES:
@@ -41,7 +44,7 @@ def read_table(path, select: Select | None = None) -> Table:
     with warnings.catch_warnings(), _quiet(), limited(path):
         warnings.simplefilter("ignore")  # a damaged file leads to findings or errors of this package instead
         try:
-            return reader.read(path, select)
+            return reader.read(path, select, *beside)
         except RecordingError as error:
             if escaped(path) in str(error):
                 raise
@@ -73,13 +76,13 @@ def _reader_of(path: Path, head: bytes):
     known = readers()
     found = next((m for m in known if m.matches(head, path)), None)
     suffix = path.suffix.lower()
-    claims = [m for m in known if suffix in m.SUFFIXES]
+    claims = [m for m in known if suffix in m.SUFFIXES]  # the last is the most general
     if found is None:
         formats = ", ".join(m.FORMAT for m in known)
-        claimed = f"not a {claims[0].FORMAT} file, as its name suggests" if claims else "unknown format"
+        claimed = f"not a {claims[-1].FORMAT} file, as its name suggests" if claims else "unknown format"
         raise RecordingError(f"{path}: {claimed}; readable formats: {formats}")
     if claims and found not in claims:
         raise RecordingError(
-            f"{path}: the name suggests {claims[0].FORMAT}, the content is {found.FORMAT}; rename it if that is right"
+            f"{path}: the name suggests {claims[-1].FORMAT}, the content is {found.FORMAT}; rename it if that is right"
         )
     return found
