@@ -238,6 +238,7 @@ def test_a_signal_leaves_the_gates_off(tmp_path, monkeypatch, number):
     assert json.loads((tmp_path / "commission.json").read_text())["status"] == "stopped"
 
 
+@pytest.mark.slow
 def test_the_host_writes_within_the_heartbeat_of_the_file(monkeypatch):
     """As far as the encoder's alignment, where a turn of the shaft with 21 pole pairs leaves the longest pauses."""
     drive = load(DRIVES / "servo_24v.toml")

@@ -147,7 +147,7 @@ def test_commissioning_keeps_what_the_file_says(tmp_path, monkeypatch, capsys, n
     """The drive file itself holds the name as a key, a string and a comment."""
     monkeypatch.setattr(commissioning, "open_bus", lambda *_: SimpleNamespace(now=lambda: 1.0))
 
-    def measured(bus, drive, reverse, say, done, hold_a):
+    def measured(bus, drive, reverse, say, done, *_):
         done(Step("resistance", {"resistance": Value(1.5, 0.01, "ohm")}, f"of {name}"))
         return replace(drive, sensors=replace(drive.sensors, current_offset_code=(2048.0,) * 3)), None
 

@@ -146,6 +146,7 @@ def test_faults_are_found_by_the_fleet(fleet):
     assert told == {f"S{n:02d}": {name} for n, name in small_fleet.FAULTS.items()}
 
 
+@pytest.mark.slow
 def test_other_order_and_workers_give_the_same_table(fleet, tmp_path):
     """Half of the rows again, backwards, in one process; a torn row and what a killed run left are no rows."""
     some, out = copied(fleet, tmp_path)

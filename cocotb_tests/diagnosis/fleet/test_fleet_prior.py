@@ -66,6 +66,7 @@ def faulty(row, n):
         )
 
 
+@pytest.mark.slow
 def test_a_fleet_of_faulty_drives_makes_no_faulty_one_of_a_healthy_drive(drive):
     folder, path, alone = drive
     assert alone.decision.verdict == "no_mismatch" and not alone.decision.effects

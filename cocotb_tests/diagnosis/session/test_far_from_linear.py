@@ -14,7 +14,7 @@ def answer_to(mistake, tmp_path):
     return diagnose(*written(mistake, tmp_path))
 
 
-@pytest.mark.parametrize("degrees", [100, slowly(48), slowly(-75), slowly(-150), slowly(165)])
+@pytest.mark.parametrize("degrees", [slowly(100), slowly(48), slowly(-75), slowly(-150), slowly(165)])
 def test_an_angle_off_by_any_part_of_a_turn_is_found(degrees, tmp_path):
     answer = answer_to(Mistake("", turned(np.radians(degrees))), tmp_path)
     assert [e.name for e in answer.effects] == ["encoder_offset"]

@@ -43,6 +43,7 @@ def test_exactly_what_is_there_is_named(seed, number, names, tmp_path):
     assert answer.verdict == ("explained" if names else "no_mismatch")
 
 
+@pytest.mark.slow
 def test_the_noise_is_at_most_that_of_the_misfit(tmp_path):
     recording, drive = files_of(31, tmp_path)
     nominal = load_nominal(drive)
