@@ -12,11 +12,11 @@ from pathlib import Path
 
 from fluxproof.checkout import BUILD
 from fluxproof.files import write_json
-from studies.brought import angles, late, legs, limits, moving
+from studies.brought import angles, dyno, emf, late, legs, limits, moving
 from studies.scored.study import print_counts, scored, write_page
 from studies.scored.truth import JUDGES
 
-ROOMS = (moving, late, limits, angles, legs)
+ROOMS = (moving, late, limits, angles, legs, dyno, emf)
 
 
 def by_kind(result: dict) -> list[str]:

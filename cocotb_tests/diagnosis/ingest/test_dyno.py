@@ -9,6 +9,7 @@ import pytest
 from cocotb_tests.support.diagnoses.answers import answer_of, found, said
 from cocotb_tests.support.drives import PAIRS, PSI
 from cocotb_tests.support.recordings.bench_logs import Truth, table, with_torque
+from fluxproof.diagnosis.ingest.usual_names import usual
 
 POINTS = [(w, 0.0, q) for w in (80.0, 250.0, 500.0, -300.0) for q in (0.0, 1.0, 2.0, 3.0, 4.5, -2.0)]
 EITHER = ("current_scale", "magnet_flux")
@@ -48,6 +49,14 @@ def test_shaft_speed_and_small_units(tmp_path):
     named = {"rpm [rpm]": rpm, "T [N.mm]": 1e3 * columns["torque"], "i_q": columns["i_q"]}
     entries = '\n[columns]\nrpm = "omega_e"\nT = "torque"\n'
     assert answer_of(tmp_path, named, entries).ambiguity == (EITHER,)
+
+
+def test_a_bus_current_is_no_bus_voltage(tmp_path):
+    """ "DC bus" is a usual name of the voltage; its unit tells that it is another signal."""
+    columns = sheet(psi=0.93) | {"DC bus [A]": np.ones(len(POINTS))}
+    assert answer_of(tmp_path, columns).ambiguity == (EITHER,)
+    assert usual("DC bus [A]", "") is None and usual("DC bus", "")[0] == usual("DC bus [kV]", "")[0] == "u_dc"
+    assert usual("u_d_ref [u_dc/2]", "") and usual("ud", "%")
 
 
 def test_rows_without_torque_under_current_are_a_lost_angle(tmp_path):

@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from fluxproof.diagnosis.ingest.units import FACTORS, OF_BUS, conversion, split_unit
+from fluxproof.diagnosis.ingest.units import COMMANDED, FACTORS, OF_BUS, conversion, split_unit
 from fluxproof.diagnosis.ingest.words import PHASES, in_words, is_unit
 
 LINES = {"ab": ("ab", "uv"), "bc": ("bc", "vw"), "ca": ("ca", "wu")}
@@ -82,9 +82,17 @@ def usual(column: str, unit: str) -> tuple[str, str, int] | None:
     """
     name, brackets = split_unit(column)
     found = _of(name, unit or brackets)
+    if found is not None and is_of_another_quantity(found[0], unit or brackets):
+        return None  # "DC bus [A]" is no voltage
     if found is None and brackets and brackets not in OF_BUS and not is_unit(brackets):
         found = _of(brackets, unit)
     return found or in_words(column, unit)
+
+
+def is_of_another_quantity(canonical: str, unit: str) -> bool:
+    """Whether a unit is none of a canonical column's, and one of something else."""
+    known = conversion(canonical, unit, 1) is not None or (canonical in COMMANDED and unit in OF_BUS)
+    return bool(unit) and not known and any(unit in units for of, units in FACTORS.items() if of != "1")
 
 
 def _of(name: str, unit: str) -> tuple[str, str, int] | None:
