@@ -61,7 +61,7 @@ def test_closed_loop_in_ghdl(tmp_path):
 
 @pytest.mark.parametrize(("run", "after"), [
     pytest.param("before the index", 16, marks=pytest.mark.slow),
-    ("clear at a trip", 44),
+    pytest.param("clear at a trip", 44, marks=pytest.mark.slow),
     pytest.param("Hall sensors: 111 at enable", 12, marks=pytest.mark.slow),
     pytest.param("Hall sensors: 111", 12, marks=pytest.mark.slow),
     pytest.param("Hall sensors: 000", 12, marks=pytest.mark.slow),

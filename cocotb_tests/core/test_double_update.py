@@ -42,6 +42,7 @@ def twice(tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_closed_loop_in_verilator(twice):
     """5,000 half periods with every event: 0 differences, and the edges of each leg where its half's duty puts them."""
     skip_without_ghdl5()

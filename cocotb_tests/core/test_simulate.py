@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.drives import PAPER
+from cocotb_tests.support.slow import slowly
 from fluxproof.checkout import DRIVES
 from fluxproof.command import main
 from fluxproof.cosim import golden_loop
@@ -125,7 +126,7 @@ def fed(name, **keys):
     return dataclasses.replace(drive, supply=Supply(**keys), protection=protection)
 
 
-@pytest.mark.parametrize("name", ["servo_24v", pytest.param("spindle_400v", marks=pytest.mark.study)])
+@pytest.mark.parametrize("name", [slowly("servo_24v"), pytest.param("spindle_400v", marks=pytest.mark.study)])
 def test_a_reversal_behind_a_diode_trips_and_says_what_it_needs(name):
     """1 mF behind a diode: named with joules, volts and a resistor; with this resistor, or a battery, it is ok."""
     drive = fed(name)
