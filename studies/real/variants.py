@@ -25,7 +25,7 @@ KEPT = 0.6  # of the rows: the first or the last of them
 CUT = ("locked_table", "locked_log", "moteus_mj5208", "moteus_spindle", "moteus_flipsky6374", "pmsyr_slow",
        "metu_columns_and_step", "vesc_light", "slow_t", "one_point_angle", "warm_two_points", "emf_line_100rpm",
        "rpm_no_angle")  # fmt: skip
-SIZED = ("locked_table", "locked_log", "moteus_mj5208", "moteus_spindle", "moteus_flipsky6374", "slow_t")  # causes
+SIZED = ("locked_table", "locked_log", "moteus_mj5208", "moteus_spindle", "moteus_flipsky6374")  # at rest, or of sizes
 WHOLE = ("warm_two_points",)  # what drifts is counted from the first row: a part has another truth
 KEYS = ("resistance_ohm", "inductance_d_h", "inductance_q_h", "magnet_flux_wb")
 
