@@ -32,8 +32,8 @@ def is_simpler(readings, left, most, absurd) -> bool:
 
     Other pole pairs scale L_d, L_q and psi: instead of one effect of a plausible size they would be chance; absurd:
     whether the effects without an interpretation have sizes outside of what is plausible.  Two factors that are met
-    exactly are one constant that is off: voltages and R, L at twice are a magnet flux at half, which is one mistake.  So
-    several interpretations must replace more effects than they are.
+    exactly are one constant that is off: voltages and R, L at twice are a magnet flux at half, which is one mistake.
+    So several interpretations must replace more effects than they are.
     """
     cost = sum(1 + bool(r.pole_pairs and not absurd) for r in readings)
     several = len(readings) > 1  # each factor is one point of a free size: so many of them must replace more effects
