@@ -119,3 +119,8 @@ def test_tests_that_are_named_exist(all_tests):
     texts = [name for name in documents() if name != "CHANGELOG.md"]
     named = {word for name in texts for word in re.findall(r"`(test_\w+)(?:\.py)?`", (ROOT / name).read_text())}
     assert named and not named - known, named - known
+
+
+@pytest.mark.parametrize(("name", "most"), [("README.md", 150), ("docs/diagnosis.md", 300)])
+def test_a_document_that_is_read_whole_stays_short(name, most):
+    assert len((ROOT / name).read_text().splitlines()) <= most
