@@ -20,6 +20,7 @@ from pathlib import Path
 import psutil
 import pyarrow.parquet as pq
 import pytest
+from distributed.scheduler import WorkerStatusPlugin
 
 from cocotb_tests.support.fleet import small_fleet
 from cocotb_tests.support.fleet.engine_work import blocking, fatal, lasting
@@ -33,7 +34,7 @@ from fluxproof.fleet import reports, table
 from fluxproof.fleet.engine import Engine, Lost
 from fluxproof.fleet.manifest import entries
 from fluxproof.fleet.session import run
-from fluxproof.fleet.watch import Watch
+from fluxproof.fleet.watch import Watch, kill
 from fluxproof.fleet.work import Item, work
 from studies.fleet.figures import Killer
 
@@ -245,6 +246,23 @@ def test_a_recording_that_takes_its_workers_with_it_is_given_up(monkeypatch):
     with Engine(2) as engine:
         found = dict(engine.each(fatal, range(4)))
     assert isinstance(found.pop(2), Lost) and found == {0: 0, 1: 1, 3: 3}
+
+
+def test_an_engine_ends_while_a_worker_is_started_again(monkeypatch):
+    """The scheduler reports the death half a second late, when the engine is already waiting for its end."""
+    begin = WorkerStatusPlugin.__init__
+
+    def late(self, *args):
+        begin(self, *args)
+        self.bcomm.interval = 0.5
+
+    monkeypatch.setattr(WorkerStatusPlugin, "__init__", late)
+    with Engine(2) as engine:
+        assert dict(engine.each(blocking, [0])) == {0: 0}
+        worker = sorted(engine.client.nthreads())[0]
+        engine.client.run(kill, [worker], workers=[worker], nanny=True)
+        while worker in engine.client.nthreads():
+            time.sleep(0.02)
 
 
 def test_an_item_beyond_its_time_is_given_up_and_the_others_go_on():

@@ -82,10 +82,8 @@ class Engine:
         return self
 
     def __exit__(self, kind=None, *_):
-        # distributed cannot end a worker that is just being started again.
         if kind is None and self.client and self.cluster:
-            with contextlib.suppress(TimeoutError):
-                self.client.wait_for_workers(len(self.cluster.workers), timeout=RESTART_S)
+            self._wait_for_restarts(len(self.cluster.workers))
         for part in (self.client, self.cluster):
             if part is not None:
                 part.close()
@@ -103,6 +101,16 @@ class Engine:
     def dashboard(self) -> str:
         """Address of the Dask dashboard."""
         return self._connected().dashboard_link or ""
+
+    def _wait_for_restarts(self, workers: int) -> None:
+        """Wait until all workers are there: distributed cannot end one that is just being started again.
+
+        Its own ``wait_for_workers`` replaces the cluster's list of workers, and a worker that is reported gone after
+        that ends the cluster with a KeyError.
+        """
+        deadline = time.monotonic() + RESTART_S
+        while len(self._connected().nthreads()) < workers and time.monotonic() < deadline:
+            time.sleep(0.1)
 
     def cores(self) -> int:
         """Threads of all workers, at least 1."""
