@@ -10,6 +10,7 @@ import numpy as np
 from fluxproof.diagnosis.effects import FluxEffect
 from fluxproof.diagnosis.ground.machine import flux_linkage
 from fluxproof.diagnosis.inference.converge import around, converged, fit_of_set
+from fluxproof.diagnosis.inference.fit import fit_set
 from fluxproof.diagnosis.inference.fitted_set import covariance_of, possible
 from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.plant import FluxMap
@@ -54,7 +55,7 @@ def bounds(posterior) -> dict[str, dict]:
     for name in problem.able():
         if name in best.names:
             continue
-        fit = problem.fit((*best.names, name))
+        fit = fit_set(problem, (*best.names, name))
         fit = converged(posterior.setup, fit, len(best.names)) or fit
         if not possible(fit):
             out[name] = {"refused": "its sign or size is impossible"}

@@ -21,6 +21,7 @@ from fluxproof.diagnosis.balance.cells import cells_of
 from fluxproof.diagnosis.catalogue.dead_time import EFFECT, full_loss
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import from_columns
+from fluxproof.diagnosis.inference.fit import fit_set
 from fluxproof.diagnosis.inference.linearise import Linearisation
 from fluxproof.diagnosis.inference.problem import Problem
 from fluxproof.diagnosis.inference.setup import Setup
@@ -57,7 +58,7 @@ def across(setup, loss, late_s=0.0):
     view = setup.view.replace(late_s=late_s)
     cells = cells_of(view, [EFFECT], setup.projector)
     problem = Problem(setup, Linearisation(view, cells, {}, loss - setup.cells.y, np.zeros(len(loss)), None))
-    fit = problem.fit(["dead_time"])
+    fit = fit_set(problem, ["dead_time"])
     rows = (problem.cells.order == 0) & (problem.cells.channel == "u")
     left = fit.left()[rows].reshape(-1, 2)
     i = setup.view.i.mean(axis=1)

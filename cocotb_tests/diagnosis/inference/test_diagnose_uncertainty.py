@@ -15,6 +15,7 @@ from fluxproof.diagnosis.effects import Wave
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import from_columns
 from fluxproof.diagnosis.inference.converge import fit_of_set
+from fluxproof.diagnosis.inference.fit import fit_set
 from fluxproof.diagnosis.inference.fitted_set import covariance_of
 from fluxproof.diagnosis.inference.problem import Problem
 from fluxproof.diagnosis.inference.setup import Setup
@@ -70,7 +71,7 @@ def test_iron_loss_size():
     view = view_of(recorded(machine={"iron_conductance_s": g}), NOMINAL)
     fit, _ = fitted(view, "iron_loss")
     found = sum(fit.c["iron_loss"].values())
-    first = sum(Problem(fit.problem.setup).fit(["iron_loss"]).c["iron_loss"].values())
+    first = sum(fit_set(Problem(fit.problem.setup), ["iron_loss"]).c["iron_loss"].values())
     assert abs(found - g) < abs(first - g)
 
 

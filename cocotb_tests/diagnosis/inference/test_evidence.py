@@ -12,6 +12,7 @@ from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.decide.off_orders import stray_swing
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.inference.evidence import evidence
+from fluxproof.diagnosis.inference.fit import fit_set
 from fluxproof.diagnosis.inference.model import BalanceRows, Columns, Prior
 from fluxproof.diagnosis.inference.points import Grouping, condense, repeated_dwells
 from fluxproof.diagnosis.inference.problem import Problem
@@ -26,9 +27,8 @@ def value_of(y, doubt, x=None, curve=None, formula=0.01):
 
     curve: a column of the effect's curve; formula: share of the effect's contribution that may be wrong.
     """
-    columns = np.stack([c for c in (x, curve) if c is not None] or [np.zeros(0)] * len(y), axis=-1)
-    columns = columns.reshape(len(y), -1)
-    k = columns.shape[1]
+    columns = np.array([c for c in (x, curve) if c is not None]).reshape(-1, len(y))
+    k = len(columns)
     effects = min(k, 1)
     level, group = np.full(len(y), 1e-4), np.zeros(len(y), np.int64)
     rows = BalanceRows(y, np.full(len(y), NOISE**2), level, doubt, group, groups=1, loads=-1, load=0.0)
@@ -90,7 +90,7 @@ def test_of_currents_and_angle_only_one_is_late():
     for key, other in (("tau", "angle"), ("angle", "tau")):
         column = problem.p.x[:, late[key]]
         problem.p.y = 20e-6 * column
-        fits[key] = problem.fit(["delay", "sampling_skew"])
+        fits[key] = fit_set(problem, ["delay", "sampling_skew"])
         assert late[key] in fits[key].take and late[other] not in fits[key].take
         assert fits[key].c["sampling_skew"][key] == pytest.approx(20e-6, rel=0.05)
         assert fits[key].c["sampling_skew"][other] == 0.0 and abs(fits[key].c["delay"]["tau"]) < 1e-6

@@ -10,6 +10,7 @@ from cocotb_tests.support.recordings.slow_logs import LEVELS, NOMINAL, Truth, lo
 from fluxproof.diagnosis.balance.slow_view import slow_view
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.ground import constants
+from fluxproof.diagnosis.inference.fit import fit_set
 from fluxproof.diagnosis.inference.fitted_set import possible
 from fluxproof.diagnosis.inference.problem import Problem
 from fluxproof.diagnosis.inference.setup import Setup
@@ -19,7 +20,7 @@ PSI, L_Q = NOMINAL.machine.magnet_flux_wb, NOMINAL.machine.inductance_q_h
 
 def test_absurd_sizes_are_impossible():
     view = slow_view(log(Truth(l_q=6.0 * L_Q)), NOMINAL)
-    alone = Problem(Setup(view, view.visible(CATALOGUE), np.ones(len(view), bool))).fit(("inductance_q",))
+    alone = fit_set(Problem(Setup(view, view.visible(CATALOGUE), np.ones(len(view), bool))), ("inductance_q",))
     assert not possible(alone)
 
 
@@ -28,9 +29,9 @@ def test_of_forms_that_exclude_each_other_a_possible_one_is_taken(monkeypatch):
     view = slow_view(log(), NOMINAL)
     view = view.turned(2e-5 * view.omega)
     problem = Problem(Setup(view, {"delay": CATALOGUE["delay"]}, np.ones(len(view), bool)))
-    assert problem.fit(("delay",)).c["delay"]["angle"]
+    assert fit_set(problem, ("delay",)).c["delay"]["angle"]
     monkeypatch.setattr(type(CATALOGUE["delay"]), "possible", lambda effect, c, *_: not c.get("angle"))
-    assert problem.fit(("delay",)).c["delay"]["tau"]
+    assert fit_set(problem, ("delay",)).c["delay"]["tau"]
 
 
 @pytest.mark.parametrize("share, costs", [(0.95, False), (0.6, False), (0.4, True)])
@@ -38,6 +39,6 @@ def test_an_implausible_value_costs(share, costs, monkeypatch):
     """Else a sum of absurd effects that cancel is preferred to the true ones."""
     view = slow_view(log(Truth(psi_m=share * PSI), levels=LEVELS[:8]), NOMINAL)
     problem = Problem(Setup(view, view.visible(CATALOGUE), np.ones(len(view), bool)))
-    priced = problem.fit(("magnet_flux",)).value
+    priced = fit_set(problem, ("magnet_flux",)).value
     monkeypatch.setattr(constants, "IMPLAUSIBLE", 1.0)
-    assert problem.fit(("magnet_flux",)).value - priced == pytest.approx(np.log(1e3) * costs)
+    assert fit_set(problem, ("magnet_flux",)).value - priced == pytest.approx(np.log(1e3) * costs)

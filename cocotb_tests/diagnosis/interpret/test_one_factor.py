@@ -19,6 +19,7 @@ from fluxproof.diagnosis.decide.interpretation import is_simpler
 from fluxproof.diagnosis.effects.drive_file import restated
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import Recording
+from fluxproof.diagnosis.inference.fit import fit_set
 from fluxproof.diagnosis.inference.problem import Problem
 from fluxproof.diagnosis.inference.search import search
 from fluxproof.diagnosis.inference.setup import Setup
@@ -38,7 +39,7 @@ def fits_of(tmp_path, factor, noise_v=0.05):
     nominal = nominal_of(tmp_path)
     view, held = view_and_held([load_recording(write(tmp_path / "r.csv", columns), nominal)], nominal)
     problem = Problem(Setup.of(rows_of(view, held)))
-    return [problem.fit((name,)) for name in ("current_scale", "machine_scale")]
+    return [fit_set(problem, (name,)) for name in ("current_scale", "machine_scale")]
 
 
 def test_two_causes_that_leave_the_same_are_as_probable(tmp_path):

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from fluxproof.diagnosis.effects import Effect, FarStart, MeasurementError
+from fluxproof.diagnosis.inference.fit import likelihood
 from fluxproof.diagnosis.inference.fitted_set import FittedSet
 from fluxproof.diagnosis.inference.linearise import linearised
 from fluxproof.diagnosis.inference.problem import Problem
@@ -21,7 +22,8 @@ def _effect(corrects, starts) -> Effect:
     """An effect that is never impossible; corrects: a measurement error; starts: it is approached from these."""
     parts = [part for part, mine in ((MeasurementError, corrects), (FarStart, bool(starts))) if mine] or [Effect]
     possible = {"too_large": lambda self, c, view: False, "possible": lambda self, c, covariance, nominal: True}
-    return object.__new__(type("Lettered", tuple(parts), {"starts": starts, **possible}))
+    of_floor = {"size": lambda self, c, nominal: 1.0, "floor": lambda self, nominal: 1.0, "plausible": {}}
+    return object.__new__(type("Lettered", tuple(parts), {"starts": starts, **possible, **of_floor}))
 
 
 class Table:
@@ -37,6 +39,7 @@ class Table:
         own = {n: tuple({"x": x} for x in starts) if n == "e" else () for n in effects}
         self.setup = SimpleNamespace(
             call=self._call,
+            odds=lambda name: 0.0,
             rows=None,
             effects={n: _effect(n in ERRORS, own[n]) for n in effects},
             view=SimpleNamespace(u=np.ones((1, 3)), to_dq=lambda u: u),  # a voltage of 1 V, all of which is misfit
@@ -48,6 +51,8 @@ class Table:
             return {name: dict(own)["x"] for name, own in arguments[1]}  # {effect: coefficient} of the point
         if step is Problem:
             return _Problem(self, arguments[1] if len(arguments) > 1 else {})
+        if step is likelihood:
+            return arguments[0].likelihood(arguments[1])
         return step(*arguments)
 
     def evidence(self, names, at) -> float:
@@ -70,16 +75,16 @@ class _Problem:
         self.keys = [(n, "x") for n in table.effects]
         self.coefficients = {n: ["x"] for n in table.effects}
         self.view, self.p = SimpleNamespace(nominal=None), SimpleNamespace(y=np.zeros(8))
+        self.most, self.often = dict.fromkeys(table.effects, np.e), dict.fromkeys(table.effects, np.inf)  # no prior
 
     def able(self):
         """All effects."""
         return list(self.table.effects)
 
-    def fit(self, names):
-        """The set with its value of the table."""
-        names = tuple(sorted(names))
+    def likelihood(self, names):
+        """What ``likelihood`` finds of a set, with its value of the table."""
         take = np.array([self.table.effects.index(n) for n in names], int)
         vector = np.array([self.table.coefficient(self.at.get(n, 2.0)) for n in names])
         value = self.table.evidence("".join(names), self.at)
         one = np.ones(len(names))
-        return FittedSet(self, names, value, take, vector, 1e-4 * np.diag(one), one, np.zeros(1), np.zeros(1))
+        return take, value, vector, 1e-4 * np.diag(one), one, np.zeros(1), np.zeros(1)

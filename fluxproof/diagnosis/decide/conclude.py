@@ -15,6 +15,7 @@ from fluxproof.diagnosis.decide.sizes import Sizes, fit_of, left_by, measured_to
 from fluxproof.diagnosis.decide.unknown_term import sparse_term
 from fluxproof.diagnosis.ground.quantities import measured
 from fluxproof.diagnosis.ground.result import Fit, NamedEffect, Remainder, UnknownTerm
+from fluxproof.diagnosis.inference.fit import fit_set
 from fluxproof.diagnosis.inference.fitted_set import covariance_of
 
 MOST_RIVALS = 5
@@ -102,7 +103,7 @@ def _shares(j: Judgement, held) -> dict[str, float]:
     measured, possible, out = measured_torque(setup), j.found.only_possible(best), {}
     for name in j.found.named:
         # What is only possible must not take over.
-        fewer = best.problem.fit([n for n in best.names if n != name and n not in possible])
+        fewer = fit_set(best.problem, [n for n in best.names if n != name and n not in possible])
         left = left_by(fewer, j.explaining & set(fewer.names))
         without = Sizes(setup, setup.cells.y, left, held, measured)
         with_it = Sizes(setup, setup.cells.y, best.left(j.explaining), held, measured)

@@ -14,6 +14,7 @@ import numpy as np
 from fluxproof.diagnosis.effects.drive_file import Restates, relative, restated
 from fluxproof.diagnosis.ground.plant_section import in_addition
 from fluxproof.diagnosis.ground.result import Estimate, NamedEffect
+from fluxproof.diagnosis.inference.fit import fit_set
 from fluxproof.diagnosis.inference.fitted_set import covariance_of
 
 
@@ -22,7 +23,7 @@ def without_possible(names, best):
     possible = names.only_possible(best)
     if not possible:
         return best, 0.0
-    fewer = best.problem.fit([n for n in best.names if n not in possible])
+    fewer = fit_set(best.problem, [n for n in best.names if n not in possible])
     return fewer, 1.0 - min(names.possible.get(n, 0.0) for n in possible)
 
 

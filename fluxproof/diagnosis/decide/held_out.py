@@ -12,6 +12,7 @@ from fluxproof.diagnosis.decide.decision import HELD_OUT, SIZELESS
 from fluxproof.diagnosis.decide.names import names_of
 from fluxproof.diagnosis.decide.sized import sizeless
 from fluxproof.diagnosis.ground import constants as k
+from fluxproof.diagnosis.inference.fit import fit_set
 from fluxproof.diagnosis.inference.search import within
 
 
@@ -49,7 +50,7 @@ def helps(posterior, name, held) -> bool:
     unseen = held[cells.block[rows]]
     certain = ~unseen | loads[rows] | (_uncertain(best, rows) <= floor2[rows])
     rows, unseen = rows[certain], unseen[certain]
-    fewer = best.problem.fit([n for n in best.names if n != name])
+    fewer = fit_set(best.problem, [n for n in best.names if n != name])
     left2 = [fit.left()[rows] ** 2 for fit in (best, fewer)]
     left2 = [np.where(loads[rows], np.minimum(x, k.DISCREPANCY**2 * floor2[rows]), x) for x in left2]
     left = np.zeros(2)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fluxproof.diagnosis.inference.fit import fit_set
 from fluxproof.diagnosis.inference.fitted_set import FittedSet
 from fluxproof.diagnosis.inference.linearise import frozen, linearised
 from fluxproof.diagnosis.inference.problem import Problem
@@ -61,7 +62,7 @@ def converged(setup, fit, steps, least=-np.inf) -> FittedSet | None:
         problem = _at(setup, at, fit.names)
         if problem is None:
             return None
-        new = problem.fit(fit.names)
+        new = fit_set(problem, fit.names)
         step = moved(new, fit)
         if step < STANDS:
             return replace(new, stands=True)
@@ -76,10 +77,10 @@ def converged(setup, fit, steps, least=-np.inf) -> FittedSet | None:
 def fit_at(setup, c) -> FittedSet | None:
     """A set of effects on the linearisation at its coefficients c, or None."""
     problem = _at(setup, c, tuple(c))
-    return None if problem is None else problem.fit(tuple(c))
+    return None if problem is None else fit_set(problem, tuple(c))
 
 
 def fit_of_set(setup, names, steps=3) -> FittedSet:
     """A set of effects on its own linearisation, from the recording as it is."""
-    fit = Problem(setup).fit(names)
+    fit = fit_set(Problem(setup), names)
     return converged(setup, fit, steps) or fit

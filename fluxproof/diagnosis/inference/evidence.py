@@ -33,6 +33,9 @@ class _State(NamedTuple):
     mu: np.ndarray  # (groups,)
     c: np.ndarray  # (k,)
     cov: np.ndarray  # (k, k)
+    v: np.ndarray  # (n,) variance of the rows at these coefficients
+    m: np.ndarray  # (k, k) posterior precision in units of the prior's deviation
+    z: np.ndarray  # (k,) coefficients in units of the prior's deviation
     own: np.ndarray  # (n,) variance of the formulas' errors
     loaded: np.ndarray  # (n,) variance of the load in the row
     squares: np.ndarray  # (n,) expected squares of the residual
@@ -47,28 +50,27 @@ def evidence(rows: BalanceRows, columns: Columns, prior: Prior, start: float) ->
     start: torque, in multiples of the smallest one, above which a row is first taken as loaded.
     Where a load hides the discrepancy, lambda stays at its scale.
     """
-    n, k = columns.x.shape
+    k, n = columns.x.shape
     state = _State(
         np.sqrt(columns.most), np.ones(len(columns.most)), np.full(rows.groups, prior.typical), np.ones(rows.groups),
-        np.zeros(k), np.zeros((k, k)), np.zeros(n), _first_loads(rows, start), np.zeros(n),
-        rows.error**2, rows.curve_error**2,
+        np.zeros(k), np.zeros((k, k)), np.zeros(n), np.zeros((k, k)), np.zeros(k),
+        np.zeros(n), _first_loads(rows, start), np.zeros(n), rows.error**2, rows.curve_error**2,
     )  # fmt: skip
-    across = np.ascontiguousarray(columns.x.T)  # rows one after the other in memory, for every loop over them
     weighted = np.zeros((k, n))
     doubtful = state.curve2.max() > 0.0 if n else False
-    value, last = 0.0, STEPS - 1
+    last = STEPS - 1
     for step in range(STEPS):
-        value = _coefficients(rows, columns, prior, across, weighted, state)
+        _coefficients(rows, columns, weighted, state)
         if step == last:
             break
         moved = _sizes(columns, prior, state)
-        _residual(rows, columns, across, state)
+        _residual(rows, columns, state)
         moved = max(moved, _discrepancy(rows, prior, state))
         if doubtful:
             _share_seen(rows, state)
         if moved < SETTLED:
             last = step + 1
-    value -= _log_never_free(rows, prior, state)
+    value = _log_evidence(rows, columns, prior, state) - _log_never_free(rows, prior, state)
     return Found(value, state.c, state.cov, state.sizes, state.lam, state.mu, _strained(rows, prior, state))
 
 
@@ -87,63 +89,62 @@ def _first_loads(rows, start):
 
 
 @jit
-def _coefficients(rows, columns, prior, across, weighted, state):
-    """Coefficients and their covariance at the sizes of ``state``; the log evidence.
-
-    log p(y) = -1/2 (r' V^-1 r + z' z + log|V| + log|M|): r is what X c leaves, z is c over the prior's deviation, M the
-    posterior precision in units of that deviation.
-    """
-    n, k = columns.x.shape
-    v = np.zeros(n)
-    logdet = 0.0
-    product = 1.0  # a logarithm of many factors at once, before the product leaves the range of a float
+def _coefficients(rows, columns, weighted, state):
+    """Coefficients and their covariance at the sizes of ``state``."""
+    k, n = columns.x.shape
+    weight = np.zeros(n)
     for i in range(n):
         g = rows.group[i]
-        v[i] = rows.variance[i] + state.lam[g] ** 2 * state.error2[i] + state.mu[g] ** 2 * state.curve2[i]
-        v[i] += state.own[i]
-        v[i] += state.loaded[i]
-        product *= v[i]
-        if not SMALL < product < LARGE:
-            logdet += np.log(product)
-            product = 1.0
-    logdet += np.log(product)
+        v = rows.variance[i] + state.lam[g] ** 2 * state.error2[i] + state.mu[g] ** 2 * state.curve2[i]
+        v += state.own[i]
+        state.v[i] = v + state.loaded[i]
+        weight[i] = 1.0 / state.v[i]
+    if k == 0:
+        return
     for p in range(k):
         for i in range(n):
-            weighted[p, i] = across[p, i] / v[i]
-    precision = np.dot(weighted, columns.x)
+            weighted[p, i] = columns.x[p, i] * weight[i]
+    precision = np.dot(weighted, columns.x.T)
     right = np.dot(weighted, rows.y)
     deviation = np.zeros(k)
     for p in range(k):
         e = columns.owner[p]
         deviation[p] = state.sizes[e] * columns.scale[p] * (1.0 if columns.core[p] else state.bend[e])
-    m = np.zeros((k, k))
-    b = np.zeros(k)
+    m = state.m
     for p in range(k):
-        b[p] = right[p] * deviation[p]
         for q in range(k):
             m[p, q] = precision[p, q] * deviation[p] * deviation[q]
         m[p, p] += 1.0
-    log_m, shrunk = 0.0, 0.0
-    left = rows.y.copy()
-    if k:
-        factor = np.linalg.cholesky(m)
-        for p in range(k):
-            log_m += 2.0 * np.log(factor[p, p])
-        inverse = np.linalg.inv(m)
-        z = inverse @ b
-        for p in range(k):
-            shrunk += z[p] * z[p]
-            state.c[p] = z[p] * deviation[p]
-            for q in range(k):
-                state.cov[p, q] = inverse[p, q] * deviation[p] * deviation[q]
-        for p in range(k):
-            for i in range(n):
-                left[i] -= across[p, i] * state.c[p]
-    # y' V^-1 y less what is explained would be nothing but rounding where nearly all of a huge misfit is explained.
-    power = shrunk
-    for i in range(n):
-        power += left[i] * left[i] / v[i]
-    value = -0.5 * (power + log_m + logdet)
+    inverse = np.linalg.inv(m)
+    state.z[:] = inverse @ (right * deviation)
+    for p in range(k):
+        state.c[p] = state.z[p] * deviation[p]
+        for q in range(k):
+            state.cov[p, q] = inverse[p, q] * deviation[p] * deviation[q]
+
+
+@jit
+def _log_evidence(rows, columns, prior, state):
+    """log p(y) = -1/2 (r' V^-1 r + z' z + log|V| + log|M|), and the prior of lambda.
+
+    r is what X c leaves; y' V^-1 y less what is explained would be nothing but rounding where nearly all of a huge
+    misfit is explained.
+    """
+    left = rows.y - np.dot(state.c, columns.x)
+    power, twice_log_m = 0.0, 0.0
+    product = 1.0  # a logarithm of many factors at once, before the product leaves the range of a float
+    logdet = 0.0
+    for i in range(len(left)):
+        power += left[i] * left[i] / state.v[i]
+        product *= state.v[i]
+        if not SMALL < product < LARGE:
+            logdet += np.log(product)
+            product = 1.0
+    logdet += np.log(product)
+    if len(state.z):
+        power += np.dot(state.z, state.z)
+        twice_log_m = 2.0 * np.sum(np.log(np.diag(np.linalg.cholesky(state.m))))
+    value = -0.5 * (power + twice_log_m + logdet)
     for g in range(rows.groups):
         value -= prior.steep * np.log(1.0 + (state.lam[g] / prior.typical) ** 2)
     return value
@@ -171,30 +172,24 @@ def _sizes(columns, prior, state):
 
 
 @jit
-def _residual(rows, columns, across, state):
+def _residual(rows, columns, state):
     """Expected squares of the residual, and the variance of the formulas' errors in it."""
-    n, k = columns.x.shape
-    spread = np.dot(state.cov, across)
-    part = np.zeros(n)
+    k, n = columns.x.shape
+    left = rows.y - np.dot(state.c, columns.x)
+    spread = np.dot(state.cov, columns.x)
     squares, own = state.squares, state.own
     for i in range(n):
-        squares[i] = rows.y[i]
+        squares[i] = left[i] * left[i]
         own[i] = 0.0
-    for e in range(len(columns.most)):
-        for i in range(n):
-            part[i] = 0.0
-        for p in range(k):
-            if columns.owner[p] == e:
-                for i in range(n):
-                    part[i] += across[p, i] * state.c[p]
-        for i in range(n):
-            squares[i] -= part[i]
-            own[i] += (columns.formula[e] * part[i]) ** 2
-    for i in range(n):
-        squares[i] *= squares[i]
     for p in range(k):
         for i in range(n):
-            squares[i] += spread[p, i] * across[p, i]
+            squares[i] += spread[p, i] * columns.x[p, i]
+    for e in range(len(columns.most)):
+        if columns.formula[e] > 0.0:
+            mine = np.where(columns.owner == e, state.c, 0.0)
+            part = np.dot(mine, columns.x)
+            for i in range(n):
+                own[i] += (columns.formula[e] * part[i]) ** 2
 
 
 @jit

@@ -5,15 +5,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fluxproof.diagnosis.effects import believable
 from fluxproof.diagnosis.ground import constants as k
-
-if TYPE_CHECKING:
-    from fluxproof.diagnosis.inference.problem import Problem
+from fluxproof.diagnosis.inference.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ import numpy as np
 
 from fluxproof.diagnosis.effects import MeasurementError
 from fluxproof.diagnosis.inference.converge import converged
+from fluxproof.diagnosis.inference.fit import fit_set
 from fluxproof.diagnosis.inference.fitted_set import FittedSet, possible
 from fluxproof.diagnosis.inference.problem import Problem
 from fluxproof.diagnosis.inference.setup import Setup
@@ -61,7 +62,7 @@ class Judged:
             known = self.fits.get(names)
             fresh = own or known is None or not known.own
             if fresh and (self.allowed is None or self.allowed.issuperset(names)):
-                self._keep(problem.fit(names), own)
+                self._keep(fit_set(problem, names), own)
 
     def linearise(self, names: Names, steps=3):
         """Judge a set on its own linearisation."""

@@ -40,7 +40,7 @@ class BalanceRows(NamedTuple):
 class Columns(NamedTuple):
     """The columns (k,) of a set of effects and what is known of their coefficients."""
 
-    x: np.ndarray  # (n, k)
+    x: np.ndarray  # (k, n), so that loops over the rows run along the memory
     scale: np.ndarray  # (k,) coefficient that makes a column as large as its effect's floor
     owner: np.ndarray  # (k,) int, the effect of a column
     core: np.ndarray  # (k,) bool, a column of the formula and not of the free curve
@@ -73,4 +73,4 @@ class Found(NamedTuple):
 def no_columns(n: int) -> Columns:
     """The empty set of effects over n rows."""
     none = np.zeros(0)
-    return Columns(np.zeros((n, 0)), none, np.zeros(0, np.int64), np.zeros(0, bool), none, none)
+    return Columns(np.zeros((0, n)), none, np.zeros(0, np.int64), np.zeros(0, bool), none, none)

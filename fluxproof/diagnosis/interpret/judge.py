@@ -26,6 +26,7 @@ from fluxproof.diagnosis.effects.constant import is_of_nameplate
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.machine import flux_terms
 from fluxproof.diagnosis.inference.evidence import evidence
+from fluxproof.diagnosis.inference.fit import fit_set
 from fluxproof.diagnosis.inference.fitted_set import implausible
 from fluxproof.diagnosis.inference.linearise import Rows
 from fluxproof.diagnosis.inference.model import no_columns
@@ -82,7 +83,7 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
         progress(f"interpretation: {j.readings[0].says}")
         read = setup.call(_read, setup, tuple(r.code for r in j.readings))
         if not is_simpler(j.readings, ("any",), most, absurd):  # no effect may be left beside it
-            alone = Problem(read).fit(()).value + prior + terms.jacobian(j.readings)
+            alone = fit_set(Problem(read), ()).value + prior + terms.jacobian(j.readings)
             if alone <= known:
                 continue
         other = setup.call(search, read, progress)
@@ -136,7 +137,7 @@ def _read(setup, codes) -> Setup:
     raw = Setup.of(setup.call(_rows_as_read, setup.rows, codes), setup.call).read_like(setup, volts, amps)
     if any(r.turn for r in readings):
         return raw
-    return max((raw, raw.smoothly(setup, volts, amps)), key=lambda s: Problem(s).fit(()).value)
+    return max((raw, raw.smoothly(setup, volts, amps)), key=lambda s: fit_set(Problem(s), ()).value)
 
 
 def _rows_as_read(rows, codes) -> Rows:
