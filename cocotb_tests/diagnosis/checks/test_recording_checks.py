@@ -309,6 +309,17 @@ def test_one_gap_is_singular(tmp_path, nominal):
 
 def test_every_check_has_a_stage():
     assert {m.STAGE for m in checks()} == set(STAGES)
+    stage = {m.__name__.rpartition(".")[2]: m.STAGE for m in checks()}
+    assert len(checks()) == len(stage)
+    assert all(stage[other] == m.STAGE for m in checks() for other in getattr(m, "AFTER", ()))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FAULTS)
+def test_nothing_but_what_a_check_names_orders_a_stage(tmp_path, nominal, name, monkeypatch):
+    backward = checks(backward=True)
+    monkeypatch.setattr("fluxproof.diagnosis.checks.checks", lambda: backward)
+    test_each_fault_is_found_and_corrected(tmp_path, nominal, name)
 
 
 @pytest.mark.parametrize("bad", [np.nan, slowly(np.inf), slowly(1e300)])

@@ -3,6 +3,7 @@
 
 A check has a STAGE and ``check(recording, nominal)``, which edits the recording in place: it appends Problems, clears
 ``usable`` or ``joined`` and corrects what is unambiguous.  Notes that are not findings go to meta["notes"].
+One that relies on the corrections of others of its stage names their files in AFTER; nothing else orders a stage.
 Stages run in this order, since each relies on the corrections of the earlier ones:
 
     values    missing and infinite numbers
@@ -23,17 +24,23 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+from graphlib import TopologicalSorter
 
 import numpy as np
 
 STAGES = ("values", "time", "gates", "units", "complete", "channels", "geometry", "signals", "extent")
 
 
-def checks() -> list:
-    """All check modules of this folder in their order of execution."""
-    modules = [importlib.import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(__path__)]
-    found = [m for m in modules if hasattr(m, "check")]
-    return sorted(found, key=lambda m: (STAGES.index(m.STAGE), m.__name__))
+def checks(backward: bool = False) -> list:
+    """All check modules of this folder in their order; backward: those that have none, the other way round."""
+    modules = {m.name: importlib.import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(__path__)}
+    found = {name: module for name, module in modules.items() if hasattr(module, "check")}
+    out = []
+    for stage in STAGES:
+        names = sorted((name for name, module in found.items() if module.STAGE == stage), reverse=backward)
+        after = {name: getattr(found[name], "AFTER", ()) for name in names}
+        out += [found[name] for name in TopologicalSorter(after).static_order()]
+    return out
 
 
 def check_recording(recording, nominal) -> None:

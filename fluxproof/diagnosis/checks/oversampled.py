@@ -14,6 +14,7 @@ from fluxproof.diagnosis.checks.missing import keep_rows
 from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "time"
+AFTER = ("order",)
 EVEN = 0.02  # how near the period is to a whole number of rows
 MOST = 256  # rows of a period
 LEAST = 50  # periods

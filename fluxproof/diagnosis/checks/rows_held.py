@@ -13,6 +13,7 @@ from fluxproof.diagnosis.checks.missing import keep_rows
 from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "time"
+AFTER = ("oversampled",)
 LEAST_DIFFERENT = 100  # different rows
 REGULAR = 0.9  # share of them that are written equally often
 CLOSE = 0.02  # of the angle's advance

@@ -16,6 +16,7 @@ from fluxproof.diagnosis.ground.recording import Problem
 from fluxproof.diagnosis.ingest.points import held_one_after_another, mark_points
 
 STAGE = "time"
+AFTER = ("order", "rows_held")
 TOLERANCE = 0.02  # of the sample time: the clock of a logger is more accurate
 JOINED = 0.25
 SLOW_FROM = 1.5

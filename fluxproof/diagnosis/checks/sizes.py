@@ -14,6 +14,7 @@ from fluxproof.diagnosis.conventions.units import IN_A_DUTY, KELVIN, OF_BUS_VOLT
 from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "units"
+AFTER = ("codes",)
 MUCH = 20.0  # times the rated value: more than any overload
 PLAUSIBLE = 4.0  # times the rated value, after the conversion
 ROUNDING = 0.005

@@ -14,6 +14,7 @@ from fluxproof.diagnosis.checks.balance import FIT, discriminates, misfit, rows_
 from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "geometry"
+AFTER = ("phases",)
 LARGE = 0.05  # largest deviation of a lagging or scaled speed estimate; beyond it the unit is wrong
 WRONG = 2.0
 MOST_TURNS = 1.0  # electrical, in a period of the control
