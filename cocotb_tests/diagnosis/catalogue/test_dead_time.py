@@ -18,6 +18,7 @@ from cocotb_tests.support.slow import slowly
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.cells import cells_of
+from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.catalogue.dead_time import EFFECT, full_loss
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import from_columns
@@ -27,6 +28,8 @@ from fluxproof.diagnosis.inference.problem import Problem
 from fluxproof.diagnosis.inference.setup import Setup
 from studies.blind import cases
 from studies.blind.generate import listing
+from studies.mishaps.bases import BASES
+from studies.mishaps.bases import columns as columns_of
 
 NOMINAL = load_nominal(PAPER)
 
@@ -143,3 +146,18 @@ def test_a_loss_that_rises_up_to_rated_current_may_be_a_resistance():
     said = EFFECT.caveat(SimpleNamespace(machine=machine), c)
     assert said.startswith("The loss of the inverter rises by 2.4 V") and "0.14 Ohm larger" in said
     assert not EFFECT.caveat(SimpleNamespace(machine=machine), {"v_0.02": 7.0})
+
+
+def test_a_rated_current_of_ten_times_the_true_one_leaves_a_resistance_a_resistance(tmp_path):
+    """A ramp that no current leaves was named in its place, beside blocks that held steps between operating points."""
+    base, path = BASES["robot"], tmp_path / "drive.toml"
+    document = base.drive()
+    document["machine"]["rated_current_a"] *= 10.0
+    path.write_text("".join(f"[{s}]\n" + "".join(f"{k} = {v}\n" for k, v in d.items()) for s, d in document.items()))
+    nominal = load_nominal(path)
+    view = view_of(from_columns(columns_of("robot"), nominal.sample_time_s), nominal)
+    swing = np.ptp(view.i.real, axis=1) + np.ptp(view.i.imag, axis=1)
+    assert swing.max() < 0.2 * base.machine["rated_current_a"] and len(view) > 20
+    setup = Setup(view, {"dead_time": EFFECT, "resistance": CATALOGUE["resistance"]}, np.ones(len(view), bool))
+    problem = Problem(setup)
+    assert problem.fit(["resistance"]).value > problem.fit(["dead_time"]).value + 100.0

@@ -47,6 +47,17 @@ def test_rows_that_fit_as_recorded_speak_against_a_change(nominal, fit):
     assert contradicts(rows, rows.change(u_dq=np.conj(rows.u_dq))) == (fit > 1)
 
 
+def test_magnets_that_warm_in_field_weakening_are_no_sign_of_the_voltage(tmp_path, nominal):
+    """Warm magnets turn the q voltage of nearly all rows round; the few cold rows fit as recorded."""
+    deep = -0.95 * PSI / L_D  # what is left of the flux, a twentieth, has the other sign with magnets of nine tenths
+    points = [(w, deep, q) for w in (1500.0, 1800.0) for q in (0.5, -0.5, 0.8, -0.8)]
+    cold, hot = table(points=[(1500.0, 0.0, 1.0), (1500.0, 0.0, -1.0)]), table(Truth(psi=0.9 * PSI), points * 12)
+    both = {name: np.concatenate([cold[name], hot[name]]) for name in hot}
+    assert not corrected(load_recording(write(tmp_path / "r.csv", both), nominal))
+    (undone,) = corrected(load_recording(write(tmp_path / "hot.csv", hot), nominal))  # nothing contradicts it there
+    assert undone.startswith("u_q_ref has the opposite sign")
+
+
 def test_currents_that_a_wrong_nameplate_hides_are_in_amperes(tmp_path, nominal):
     """Stronger magnets and a larger L_d cancel at the largest current: no prefix is seen where no current is."""
     stronger = Truth(psi=1.86 * PSI, l_d=0.86 * PSI / 5.0)

@@ -8,7 +8,7 @@ import pytest
 
 from cocotb_tests.support.drives import PAPER
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.decide import held_out
+from fluxproof.diagnosis.decide import held_out, likeliest
 from fluxproof.diagnosis.decide.names import Names
 from fluxproof.diagnosis.decide.relevant import relevant_names
 from fluxproof.diagnosis.decide.sized import has_size
@@ -102,3 +102,18 @@ def test_a_mean_torque_counts_beside_the_noise_of_its_ripple(monkeypatch):
     assert held_out.helps(posterior, "a", np.ones(1, bool))
     left[means] = 4.1  # it explains nothing there
     assert not held_out.helps(posterior, "a", np.ones(1, bool))
+
+
+@pytest.mark.parametrize(("after", "against"), [(0.2, "fit as well"), (0.8, "leaves 80 %"), (1.4, "held-out points")])
+def test_the_best_fit_of_an_unexplained_misfit_is_told_with_what_speaks_against_it(monkeypatch, after, against):
+    """Magnets that warm by 92 K were not mentioned, as held-out points lie beyond the fitted temperatures."""
+    setup = SimpleNamespace(effects=CATALOGUE, cells=SimpleNamespace(y=1.0))
+    fit = SimpleNamespace(names=("magnet_temperature",), left=lambda: after)
+    nothing = SimpleNamespace(names=(), left=lambda: 1.0)
+    searched = SimpleNamespace(
+        setup=setup, weights=lambda: [(0.7, fit), (0.3, nothing)], present=lambda: {fit.names[0]: 0.7}
+    )
+    monkeypatch.setattr(likeliest, "_left", lambda setup, y, held: y)
+    monkeypatch.setattr(likeliest, "estimates_in", lambda fit, name: {})
+    found = likeliest.likeliest(searched, {}, None)
+    assert [e.name for e in found.effects] == ["magnet_temperature"] and against in found.against

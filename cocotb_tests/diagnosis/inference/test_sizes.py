@@ -19,7 +19,7 @@ PSI, L_Q = NOMINAL.machine.magnet_flux_wb, NOMINAL.machine.inductance_q_h
 
 
 def test_absurd_sizes_are_impossible():
-    view = slow_view(log(Truth(l_q=6.0 * L_Q)), NOMINAL)
+    view = slow_view(log(Truth(l_q=12.0 * L_Q)), NOMINAL)
     alone = fit_set(Problem(Setup(view, view.visible(CATALOGUE), np.ones(len(view), bool))), ("inductance_q",))
     assert not possible(alone)
 
@@ -34,11 +34,11 @@ def test_of_forms_that_exclude_each_other_a_possible_one_is_taken(monkeypatch):
     assert fit_set(problem, ("delay",)).c["delay"]["tau"]
 
 
-@pytest.mark.parametrize("share, costs", [(0.95, False), (0.6, False), (0.4, True)])
+@pytest.mark.parametrize("share, costs", [(0.95, 0.0), (0.6, 0.0), (0.4, 0.32), (0.2, 1.0)])
 def test_an_implausible_value_costs(share, costs, monkeypatch):
-    """Else a sum of absurd effects that cancel is preferred to the true ones."""
+    """Else a sum of absurd effects that cancel is preferred to the true ones; there is no step at what is plausible."""
     view = slow_view(log(Truth(psi_m=share * PSI), levels=LEVELS[:8]), NOMINAL)
     problem = Problem(Setup(view, view.visible(CATALOGUE), np.ones(len(view), bool)))
     priced = fit_set(problem, ("magnet_flux",)).value
     monkeypatch.setattr(constants, "IMPLAUSIBLE", 1.0)
-    assert fit_set(problem, ("magnet_flux",)).value - priced == pytest.approx(np.log(1e3) * costs)
+    assert fit_set(problem, ("magnet_flux",)).value - priced == pytest.approx(np.log(1e3) * costs, abs=0.1)

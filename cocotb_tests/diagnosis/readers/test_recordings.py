@@ -138,7 +138,8 @@ def test_text_encodings(tmp_path, nominal, encoding):
     table = made(600) | {"temp_winding [°C]": np.full(600, 40.0)}
     path = tmp_path / "r.csv"
     path.write_bytes(as_text(table, ",", ".").encode(encoding))
-    assert load_recording(path, nominal)["temp_winding"][0] == 40.0
+    recording = load_recording(path, nominal)
+    assert recording["temp_winding"][0] == 40.0 and recording.meta["columns"]["t"] == "t"
 
 
 def test_rows_without_a_line_end_and_lines_in_messages(tmp_path, nominal):

@@ -26,8 +26,10 @@ SHORTER = (100, 50)  # for short dwells
 LEAST_BLOCKS = 12
 MOST_BLOCKS = 320  # more blocks increase the run time but hardly the accuracy
 RAMP_TORQUE = 0.02  # of rated torque: a larger change of inertial torque within a block means a ramp
-CURRENT_STEP = 0.08  # of rated current: a larger change within a block means a transient
-RIPPLE = 0.05  # of rated current, rms around the block's parabola
+CURRENT_STEP = 0.08  # of rated current, or of what is recorded: a larger change within a block means a transient
+RIPPLE = 0.05  # the same, rms around the block's parabola
+RECORDED = 2.0  # times the largest recorded current, if that is less than the rated one: a step of it is a transient
+LEAST_RATED = 0.1  # of rated current: noise of a sensor is a share of its range, whatever flows
 SPEED_STEP = 0.06  # of the largest speed
 LATE_SPEED_STEP = 0.003  # the same where the angle is integrated from the speed: a recorded speed is filtered and late
 SLOW_SHARE = 0.01  # of the speed at which the EMF reaches the bus voltage: tolerance at standstill
@@ -221,7 +223,7 @@ def _cut(recording, nominal, run, i_s, omega, block_rows):
     margin = HALF_WIDTH + nominal.control.duty_applied_after_samples + 2
     slow = SLOW_SHARE * nominal.inverter.dc_bus_v / flux_level(machine)
     top = max(float(np.nanmax(np.abs(omega), initial=0.0)), slow)
-    scale = (machine.rated_current_a, top)
+    scale = (_current_scale(i_s, machine.rated_current_a), top)
     lengths = [block_rows, *(n for n in SHORTER if n < block_rows)]
     steps = [SPEED_STEP] if recording.meta.get("angle") != "integrated" else [LATE_SPEED_STEP, SPEED_STEP]
     tries = [(n, 1.0, step) for step in steps for n in lengths]
@@ -251,6 +253,15 @@ def _cut(recording, nominal, run, i_s, omega, block_rows):
         keep = np.unique(np.linspace(0, len(starts) - 1, MOST_BLOCKS).round().astype(int))
         starts, dwell = starts[keep], dwell[keep]
     return starts, dwell, length
+
+
+def _current_scale(i, rated) -> float:
+    """Current [A] that the tolerances are shares of: the rated one, less if the recording reaches little of it.
+
+    With a rated current of ten times the true one, steps between operating points were steady blocks.
+    """
+    recorded = float(np.nanquantile(np.abs(i), 0.99)) if np.isfinite(i).any() else rated
+    return rated * min(max(RECORDED * recorded / rated, LEAST_RATED), 1.0)
 
 
 def _steady_starts(run, i, omega, scale, block_rows, margin, patience, speed_step):

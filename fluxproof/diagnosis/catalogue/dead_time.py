@@ -24,7 +24,8 @@ from fluxproof.diagnosis.effects import (
 )
 from fluxproof.diagnosis.ground.result import Estimate
 
-# No width is so large that the curve would resemble a resistance over most of the current range.
+# No width is so large that the curve would resemble a resistance over most of the current range: one that no recorded
+# current leaves would be one.
 WIDTHS = (0.02, 0.12)  # of rated current: where the loss of the core has reached its full value
 KNOTS = (0.0, 0.005, 0.02, 0.05, 0.12)  # of rated current: ends of the bumps of the free curve
 DROP = 0.05  # of rated current: where device drops have reached their full value
@@ -102,9 +103,18 @@ def _half_late(loss, nominal) -> float:
     return 0.5 * abs(loss) / nominal.inverter.dc_bus_v * nominal.sample_time_s
 
 
+def _ramps_left(view) -> dict[str, Callable]:
+    """The ramps that some recorded current leaves, at least the narrowest.
+
+    Decided once for all views of a recording: corrected currents must not change the set of coefficients.
+    """
+    largest = view.memo.setdefault("ramps", float(np.abs(view.i).max()) / view.machine.rated_current_a)
+    return {key: RAMPS[key] for key, width in WIDTH_OF.items() if width < largest or width == WIDTHS[0]}
+
+
 class DeadTime(LegLoss, FreeCurve, Caveat, Described):
     def core(self, view):
-        return _following_bus(view, _leg_losses(view, RAMPS))
+        return _following_bus(view, _leg_losses(view, _ramps_left(view)))
 
     def free(self, view):
         out = _following_bus(view, _leg_losses(view, BUMPS | TAILS))

@@ -6,8 +6,6 @@ import numpy as np
 from fluxproof.diagnosis.balance.curves import course
 from fluxproof.diagnosis.effects import DOUBT, Constant, FluxEffect, Parameter, Spread, one, sigma
 
-MOST_OF_NAMEPLATE = 2.0  # of the nameplate's flux, by which the true one may differ
-
 
 class MagnetFlux(FluxEffect, Constant, Spread):
     rescales = ("magnet_flux_wb",)
@@ -31,10 +29,6 @@ class MagnetFlux(FluxEffect, Constant, Spread):
 
     def ceiling(self, nominal):
         return 0.6 * nominal.machine.magnet_flux_wb
-
-    def too_large(self, c, view):
-        most = MOST_OF_NAMEPLATE * view.machine.magnet_flux_wb
-        return self.size(c, view.nominal) > most or self.leaves_nothing(c, view.machine)
 
     def estimates(self, c, covariance, nominal):
         return one("magnet_flux_wb", "Wb", nominal.machine.magnet_flux_wb + c["delta_psi_m"], sigma(covariance))

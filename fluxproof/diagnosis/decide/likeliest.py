@@ -16,7 +16,7 @@ AGAINST = {
 
 
 def likeliest(searched, idle, held) -> BestFit | None:
-    """The best fit among the sets that a simulation has parameters for; None if no effect is better than none.
+    """The best fit among the sets that a simulation has parameters for; None if no effect is more probable than none.
 
     searched: the posterior before effects were rejected; idle: {effect: why it was}; held: (b,) held-out blocks.
     """
@@ -26,11 +26,9 @@ def likeliest(searched, idle, held) -> BestFit | None:
         return None
     p, fit = able[0]
     before, left = (_left(setup, y, held) for y in (setup.cells.y, fit.left()))
-    if left >= before:
-        return None
     present = searched.present()
     effects = tuple(NamedEffect(n, min(present[n], 0.999), estimates_in(fit, n), 0.0) for n in fit.names)
-    return BestFit(effects, float(p), left, _against(p, fit, idle, left / before))
+    return BestFit(effects, float(p), left, _against(p, fit, idle, left / max(before, 1e-300)))
 
 
 def _left(setup, y, held) -> float:
@@ -43,8 +41,8 @@ def _left(setup, y, held) -> float:
 def _against(p, fit, idle, share) -> str:
     """Why the best fit is not asserted; share: of the misfit's rms that it leaves."""
     rejected = [idle[n] for n in fit.names if n in idle]
-    if rejected:
-        return AGAINST[rejected[0]]
+    if rejected or share >= 1.0:
+        return AGAINST[rejected[0] if rejected else HELD_OUT]
     if 1.0 - share**2 < k.HALF:
         return f"it leaves {100 * share:.0f} % of the misfit"
     return "other sets of effects fit as well" if p < 1.0 - k.DOUBTED else "the residual may imitate it"

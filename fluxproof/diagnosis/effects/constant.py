@@ -7,7 +7,7 @@ from fluxproof.diagnosis.effects.effect import Effect
 
 UNITS = ("_ohm", "_h", "_wb")  # of the keys of [machine]
 OFTEN = 2.0  # of a constant: a drive file is copied or guessed, so that a factor of three is no rare error
-LEAST_LEFT = 0.1  # of a parameter of the machine: a smaller one is not this machine
+LEAST_LEFT = 0.1  # of a parameter of the machine: a smaller one is not this machine, nor one as many times as large
 
 
 class Constant(Effect):
@@ -21,6 +21,10 @@ class Constant(Effect):
         return OFTEN * getattr(nominal.machine, self.rescales[0]) if is_of_nameplate(self) else None
 
     def too_large(self, c, view):
+        if is_of_nameplate(self):  # any sensor may be off as far, which would be explained in its place
+            return abs(next(iter(c.values()))) > getattr(
+                view.machine, self.rescales[0]
+            ) / LEAST_LEFT or self.leaves_nothing(c, view.machine)
         return super().too_large(c, view) or self.leaves_nothing(c, view.machine)
 
     def leaves_nothing(self, c, machine) -> bool:

@@ -47,10 +47,10 @@ class Layout:
 
 def encoding_of(head: bytes) -> str:
     """UTF-16 and UTF-8 by their byte-order marks or their zero bytes, else UTF-8 if it decodes, else Windows-1252."""
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):  # first: without "utf-16" the mark is a part of the first name
+        return "utf-16"
     if half := half_zero(head):
         return half
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return "utf-16"
     if head.startswith(b"\xef\xbb\xbf"):
         return "utf-8-sig"
     try:
