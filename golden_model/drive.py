@@ -168,7 +168,9 @@ class Protection:
     watchdog_periods: float = positive("1", "longest time without a sample, in sample times", 1.5)
     overspeed_rad_s: float | None = positive("rad/s", "mechanical; 1.2 times the rated speed if none", None)
     runaway_rad_s: float | None = positive("rad/s", "mechanical, against the reference; a tenth of rated if none", None)
-    runaway_s: float = positive("s", "longest time against the reference without braking", 0.02)
+    runaway_s: float | None = positive(
+        "s", "longest time against the reference without braking; 20 ms if none, with Hall sensors a sector more", None
+    )
     standstill_rad_s: float | None = positive("rad/s", "mechanical; the shaft stands below; 1 % of rated if none", None)
     stall_s: float = positive("s", "time at the current limit at standstill that is a stall", 0.1)
     encoder_lost_v: float | None = positive("V", "by which the EMF may be wrong at rest; from the data if none", None)

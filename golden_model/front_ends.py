@@ -4,6 +4,7 @@
 The front ends of docs/board.md are set from these keys; without a section the core gets ready-made codes.
 """
 
+import math
 from dataclasses import dataclass
 
 from golden_model.drive_keys import DriveError, choice, flag, not_negative, positive, whole
@@ -129,7 +130,9 @@ def check_converters(drive):
     if c.kind == "spi":
         ratio, (lo, hi) = clock / c.clock_hz, SPI_RATIO
         if not lo <= ratio <= hi or abs(ratio / round(ratio) - 1.0) > 1e-6:
-            allowed = f"[core] clock_hz = {clock:g} Hz over a whole number from {lo} to {hi}"
+            around = {min(max(n, lo), hi) for n in (math.floor(min(ratio, hi)), math.ceil(min(ratio, hi)))}
+            nearest = " and ".join(f"{clock / n:.7g} Hz" for n in sorted(around, reverse=True))
+            allowed = f"[core] clock_hz = {clock:g} Hz over a whole number from {lo} to {hi}; nearest: {nearest}"
             _refuse("[converters] clock_hz", c.clock_hz, allowed)
         least = drive.sensors.adc_bits + c.skip_bits
         if (c.bits or drive.sensors.adc_bits) < least:

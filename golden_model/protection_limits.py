@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The registers of the protection, as golden_model/scaling.py does for the others.
 
-The default limits lie outside the range of a healthy drive: overcurrent at twice the current limit, the
-sum of the currents at a fifth of the rated current, the bus at a tenth and 1.3 times its nominal value, no sample for
-1.5 periods, 1.2 times the rated speed, a tenth of it against the reference for 20 ms without braking, a sensor that
-shows 1 % of the rated current at rest, a stall of 0.1 s, an encoder that contradicts the EMF for 2.8 ms or 1.4 over the
-bandwidth of the current loop. An open load is reported and does not trip. The position may deviate from its linear
-extrapolation by 5e-4 turn plus four codes, or four counts of an
-incremental encoder: no shaft accelerates that much within a sample, and a frozen code is detected from that rotation
-per sample on.
+The default limits lie outside the range of a healthy drive: overcurrent at twice the current limit, the sum of the
+currents at a fifth of the rated current, the bus at a tenth and 1.3 times its nominal value, no sample for 1.5 periods,
+1.2 times the rated speed, a tenth of it against the reference for 20 ms without braking (with Hall sensors for a sector
+longer), a sensor that shows 1 % of the rated current at rest, a stall of 0.1 s, an encoder that contradicts the EMF for
+2.8 ms or 1.4 over the bandwidth of the current loop. An open load is reported and does not trip. The position may
+deviate from its linear extrapolation by 5e-4 turn plus four codes, or four counts of an incremental encoder: no shaft
+accelerates that much within a sample, and a frozen code is detected from that rotation per sample on.
 """
 
 import math
@@ -18,6 +17,7 @@ from golden_model.formats import LIMIT, PU
 from golden_model.io.emf_check import EMF_I, EMF_L, EMF_MIN, EMF_W, MEAN
 from golden_model.io.emf_check import SAMPLES as EMF_SAMPLES
 from golden_model.io.fault_latch import NAMES
+from golden_model.io.motion_checks import AWAY as AWAY_COUNT
 from golden_model.io.offset_check import OFFSET
 from golden_model.scale_entry import Entry, base_keys, leg_loss_v
 from golden_model.units import TURN_RAD
@@ -25,6 +25,7 @@ from golden_model.units import TURN_RAD
 TRIP_OF_LIMIT, TRIP_OF_RANGE = 2.0, 0.98  # overcurrent: of the current limit, at most of the sensors' range
 SUM_OF_RATED = 0.2  # of the rated current: a larger sum of the phase currents is a sensor fault
 BUS_LOW, BUS_HIGH = 0.1, 1.3  # of the nominal bus voltage
+RUNAWAY_S = 0.02  # against the reference without braking; with Hall sensors a sector at that speed more
 OVERSPEED, AWAY, STANDS = 1.2, 0.1, 0.01  # of the rated speed: trips; looked for a runaway; the shaft stands below
 OPEN_OF_RATED, OFFSET_OF_RATED = 0.02, 0.01  # of the rated current: of a connected phase; of a sensor at rest
 BRAKE_HYSTERESIS = 0.97  # of the voltage that switches the brake resistor on: off below
@@ -151,8 +152,12 @@ def motion_limits(drive):
         given = None if given is None else pairs * given
         keys = "[machine] pole_pairs, rated_speed_rad_s"
         yield _limit(name, given, part * rated * pairs, "rad/s", b.omega_me_rad_s, key, keys, speed)
-    sample = "[inverter] pwm_frequency_hz"
-    yield Entry("runaway_samples", p.runaway_s, "s", t_s, f"[protection] runaway_s; {sample}")
+    sample, away = "[inverter] pwm_frequency_hz", p.runaway_s
+    if away is None:
+        away, late = RUNAWAY_S, AWAY * rated * pairs if p.runaway_rad_s is None else p.runaway_rad_s * pairs
+        if drive.encoder.kind == "hall":  # the speed is that of the sector before: a braked shaft seems to speed up
+            away = min(away + SECTOR / late, AWAY_COUNT.hi * t_s)
+    yield Entry("runaway_samples", away, "s", t_s, f"[protection] runaway_s; {sample}")
     yield Entry("stall_samples", p.stall_s, "s", t_s, f"[protection] stall_s; {sample}")
     keys = WORKING
     least = OPEN_OF_RATED * drive.working_current_a

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import signal
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -20,11 +21,12 @@ from fluxproof.commission.bus import CODES, VALUES, WINDOW, BusError, UioBus
 from fluxproof.commission.session import Refusal, Session
 from fluxproof.commission.simulated import SimulatedBus, board_of
 from fluxproof.commission.steps import commission
-from fluxproof.plant import Inverter, layout
+from fluxproof.plant import Bus, Inverter, layout
 from fluxproof.plant.inverter import averaged_leg_voltage, inverter_params
 from golden_model.drive import load
 from golden_model.drive_file import read_tables
 from golden_model.drive_keys import DriveError
+from golden_model.front_ends import Encoder
 from golden_model.io import board_map
 from golden_model.io.register_map import IDENTIFICATION
 from studies.board.commissioning import FAULTS, figures, refused, run
@@ -212,6 +214,26 @@ def test_the_command_says_why_it_refuses(tmp_path, capsys, monkeypatch):
 
 def motor_bus(drive, **changes):
     return SimulatedBus(drive, replace(board_of(drive), **changes))
+
+
+@pytest.mark.parametrize("supply", [Bus(), Bus(3e-4, 0.05, diode=True), Bus(3e-5, 0.05, diode=True)])
+def test_a_braked_shaft_raises_a_bus_that_takes_nothing_back(supply):
+    """Turned up and braked on the simulated board: an ideal bus stays, one behind a diode keeps the energy."""
+    motor = case(1002)
+    drive = replace(motor.true, encoder=Encoder())
+    sensors = replace(motor.board.sensors, position_offset_rad=0.0, position_direction=1)
+    bus = SimulatedBus(drive, replace(motor.board, bus=supply, sensors=sensors, theta_m=0.0))
+    session = Session(bus, drive)
+    session.load(reverse=0, theta_offset=0, brake_on=0, brake_off=0)
+    session.gates_on()
+    volts = []
+    trips = supply.capacitance == 3e-5
+    with pytest.raises(Refusal, match="u_dc_high.* brake resistor") if trips else nullcontext():
+        for part, samples in ((0.5, 20), (-0.5, 10)):
+            session.set(i_q_ext=part * session.limit)
+            volts.append(session.look(samples, pause_s=2e-3).u_dc.max() / drive.inverter.dc_bus_v)
+        assert volts[1] > 1.03 if supply.diode else volts[1] == pytest.approx(1.0, abs=0.01)
+    assert volts[0] == pytest.approx(1.0, abs=0.01)
 
 
 def test_bad_input_is_status_two(tmp_path, capsys):

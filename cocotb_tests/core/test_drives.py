@@ -54,7 +54,7 @@ FRONT_ENDS = {  # text after the paper's drive, what the message must contain
         "pause_s = 6e-05 s is out of range: allowed is up to 5.2e-05 s",
     ),
     "fast frame": ('[encoder]\nkind = "ssi"\nbits = 25\nclock_hz = 3e7\n', "clock_hz = 30000000", "up to 20000000 Hz"),
-    "ratio": ('[converters]\nkind = "spi"\nclock_hz = 30e6\n', "clock_hz = 3e+07", "whole number from 4 to 16"),
+    "ratio": ('[converters]\nkind = "spi"\nclock_hz = 30e6\n', "clock_hz = 3e+07", "nearest: 2.857143e+07 Hz and 3.33"),
     "slow spi": ('[converters]\nkind = "spi"\nclock_hz = 10e6\n', "clock_hz = 1e+07", "from 4 to 16"),
     "currents": ("[converters]\ncurrents = 1\n", "[converters] currents = 1", "2 up to 3"),
     "window": (

@@ -15,10 +15,10 @@ import pytest
 from cocotb_tests.support.core.limits import DRIVE, QUARTER, SET, first, play, told
 from cocotb_tests.support.slow import slowly
 from fluxproof.checkout import DRIVES, ROOT
+from fluxproof.cosim.driven_plant import bus_of
 from fluxproof.cosim.golden_clock import GoldenClock
 from fluxproof.cosim.golden_loop import simulate
 from fluxproof.cosim.scenarios import RPM, scenario
-from fluxproof.simulate.run import bus_of
 from golden_model import drive as drives
 from golden_model.control import current_limit
 from golden_model.io.fault_latch import NAMES

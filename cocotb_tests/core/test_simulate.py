@@ -24,6 +24,7 @@ from fluxproof.simulate.session import simulate
 from golden_model.board_registers import core_changes
 from golden_model.drive import load
 from golden_model.drive_keys import DriveError
+from golden_model.io import fault_latch
 from golden_model.registers import registers
 from golden_model.supply import Supply
 from golden_model.units import from_si
@@ -65,6 +66,38 @@ def test_the_trims_of_a_commissioned_file_are_those_of_its_sensors():
     told = simulated_run(drive, registers(drive), scene.current_step(drive))
     for name, within in (("i_q", 0.05), ("i_d", 0.05), ("u_max", 0.5)):
         assert told[name][-200:].mean() == pytest.approx(plain[name][-200:].mean(), abs=within), name
+
+
+LIMITS = {"overspeed": {"omega_trip": 1}, "encoder_lost": {"emf_min": 0, "emf_i": 0, "emf_w": 0, "emf_samples": 1}}
+
+
+@pytest.mark.parametrize("fault", LIMITS)
+def test_a_trip_that_no_code_of_a_sample_makes_is_one(fault):
+    """It turns the gates off and is named, unless it is ignored."""
+    given = registers(DRIVE)
+    values = given.values._replace(**LIMITS[fault])
+    told = simulated_run(DRIVE, given._replace(values=values), scene.current_step(DRIVE))
+    assert told.faults == (fault,) and told.tripped_at is not None and abs(told["true_i_q"][-1]) < 0.1
+    ignored = values._replace(fault_ignore=values.fault_ignore | 1 << fault_latch.NAMES.index(fault))
+    assert simulated_run(DRIVE, given._replace(values=ignored), scene.current_step(DRIVE)).faults == ()
+
+
+@pytest.mark.parametrize("given_s", [None, 0.02])
+def test_a_stop_soon_after_a_start_is_no_runaway_with_hall_sensors(given_s):
+    """Their speed is that of the sector before, which the start made slow: a braked shaft seems to speed up."""
+    drive = load(DRIVES / "hub_36v.toml")
+    drive = dataclasses.replace(drive, protection=dataclasses.replace(drive.protection, runaway_s=given_s))
+    n, nothing = 1300, np.zeros(1300, np.int64)
+    asked = from_si("omega_ref", -0.5 * drive.machine.pole_pairs * drive.machine.rated_speed_rad_s, drive)
+    scenario = Scenario(
+        omega_ref=np.where(np.arange(n) < 560, asked, 0), load=np.zeros(n), u_dc=np.full(n, 36.0), i_d_ref=nothing,
+        i_q_ext=nothing, speed_mode=nothing + 1, enable=nothing + 1,
+    )  # fmt: skip
+    values = registers(drive).values._replace(**core_changes(drive))
+    given = registers(drive)._replace(values=values)
+    seen = golden_loop.simulate(drive, given, scenario, dead_time_s=drive.inverter.dead_time_s, edges=edges_of(drive))
+    away = fault_latch.of_sample(seen.observed) >> fault_latch.NAMES.index("runaway") & 1
+    assert away.any() == (given_s is not None)
 
 
 # Physics that the simulation does not use

@@ -97,6 +97,9 @@ def voltage_gain(drive: Drive, u_dc: np.ndarray) -> np.ndarray:
     return 1.0 + (i.v_diode_v - i.v_switch_v) / np.maximum(u_dc, LEAST_OF_BUS * i.dc_bus_v)
 
 
+CHARGED = "a supply that takes back what braking gives, or a brake resistor ([protection] brake_on_v)"
+
+
 class Session:
     """One commissioning on a bus; ``drive`` is what is known so far."""
 
@@ -199,7 +202,8 @@ class Session:
         if self.bus.read("flags") & TRIPPED:
             self.bus.write("enable", 0)
             told = [n for k, n in enumerate(NAMES) if self.bus.read("fault_flags") >> k & 1]
-            raise Refusal(f"the core has tripped: {', '.join(told)}; expected no fault: see docs/faults.md")
+            charged = f", and {CHARGED}" if "u_dc_high" in told else ""
+            raise Refusal(f"the core has tripped: {', '.join(told)}; expected no fault: see docs/faults.md{charged}")
         size = math.hypot(*(to_si(n, row[n], self.drive) for n in ("i_d", "i_q")))
         if size > STOP_OF_LIMIT * self.limit:
             self.bus.write("enable", 0)

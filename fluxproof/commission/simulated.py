@@ -15,11 +15,12 @@ import numpy as np
 
 from fluxproof.commission.bus import CODES, VALUES, checked
 from fluxproof.commission.simulated_loop import FIELDS, INPUTS, LAST_ANGLE, REFERENCED, Around, Memory, advance
-from fluxproof.cosim.driven_plant import described_sensors
+from fluxproof.cosim.driven_plant import bus_of, described_sensors
 from fluxproof.cosim.sensor_edges import edges_of
 from fluxproof.plant import (
     FREE,
     IMPOSED_SPEED,
+    Bus,
     Inverter,
     Machine,
     Sensors,
@@ -46,7 +47,8 @@ class Board:
     inverter: Inverter = Inverter()
     dead_time_s: float = 0.0
     sensors: Sensors | None = None
-    u_dc: float | None = None  # V; nominal if none
+    u_dc: float | None = None  # V of the supply; nominal if none
+    bus: Bus = Bus()  # what is between it and the inverter; by default nothing
     legs: tuple[int, int, int] = (0, 1, 2)
     sensed: tuple[int, int, int] = (0, 1, 2)
     polarity: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -76,7 +78,7 @@ def board_of(drive) -> Board:
     if machine.inertia_kgm2 <= 0.0:
         raise DriveError("[machine] inertia_kgm2 is missing: the simulated shaft needs one")
     drops = Inverter(0.0, i.v_switch_v, i.v_diode_v, i.r_switch_ohm, i.r_diode_ohm)
-    return Board(machine, drops, i.dead_time_s, sensors, theta_m=2.0)
+    return Board(machine, drops, i.dead_time_s, sensors, bus=bus_of(drive), theta_m=2.0)
 
 
 class SimulatedBus:
@@ -88,6 +90,7 @@ class SimulatedBus:
         self._config = registers(drive).config
         self._values = {name: register.reset for name, register in board.registers.items() if register.fields}
         self._values |= {"clock_hz": round(drive.core.clock_hz), **self._config._asdict(), **board_generics(drive)}
+        source_v = float(drive.inverter.dc_bus_v if board.u_dc is None else board.u_dc)
         mode = IMPOSED_SPEED if board.locked else FREE
         params = plant_params(board.machine, board.inverter, mode=mode)
         self._around = Around(
@@ -100,7 +103,8 @@ class SimulatedBus:
             open_leg=3 if board.open_leg is None else board.open_leg,
             dead_time_s=float(board.dead_time_s),
             period_s=drive.sample_time_s,
-            u_dc=float(drive.inverter.dc_bus_v if board.u_dc is None else board.u_dc),
+            source_v=source_v,
+            bus=board.bus,
             has_index=board.has_index,
             passes=drive.encoder.index_passes,
         )
@@ -114,6 +118,7 @@ class SimulatedBus:
             observed=np.zeros(len(FIELDS), np.int64),
             held=np.zeros(2),
             peak=np.zeros(1),
+            u_dc=np.array([source_v]),
         )
         self._state, self._random = fluxproof.State(), np.random.default_rng(board.seed)
         self._done, self._due, self._settings = 0, 0.0, None

@@ -9,9 +9,9 @@ import numpy as np
 
 from fluxproof.cosim.golden_loop import mixed_kernel
 from fluxproof.cosim.sensor_edges import COUNTS, HALL, Edges, edge_speed, hall_code
-from fluxproof.plant import advance_switching, centred_gates
+from fluxproof.plant import Bus, advance_bus, advance_switching, centred_gates
 from fluxproof.plant import layout as L
-from fluxproof.plant.sensors import current_code, position_code, u_dc_code
+from fluxproof.plant.sensors import current_code, position_code, sensed_angle, u_dc_code
 from golden_model import fluxproof
 from golden_model.encoders import forced_position
 from golden_model.io.fault_latch import NAMES, TRIP
@@ -52,7 +52,8 @@ class Around(NamedTuple):
     open_leg: int  # 3: none
     dead_time_s: float  # s
     period_s: float  # s
-    u_dc: float  # V
+    source_v: float  # V, of the supply
+    bus: Bus  # what is between the supply and the inverter
     has_index: bool
     passes: int  # of the index until it is believed
 
@@ -69,6 +70,7 @@ class Memory(NamedTuple):
     observed: np.ndarray  # (len(FIELDS),) its values
     held: np.ndarray  # (2,) 1: the encoder does not move any more; mechanical rad at which it stands
     peak: np.ndarray  # (1,) A, the largest phase current so far
+    u_dc: np.ndarray  # (1,) V, of the bus
 
 
 @kernel
@@ -110,7 +112,7 @@ def encoder(around, memory, usual, k):
     lost = memory.held[0] == 1.0
     theta_m, omega_m = (memory.held[1], 0.0) if lost else (plant[L.THETA_M], plant[L.OMEGA_M])
     code, omega = position_code(a.sensors, theta_m, k), usual.omega_given
-    turns = (a.sensors.direction * theta_m + a.sensors.position_offset) / TURN_RAD
+    turns = sensed_angle(a.sensors, theta_m) / TURN_RAD
     turns_per_s = a.sensors.direction * omega_m / TURN_RAD
     if edges.speed[COUNTS] > 0.0:
         omega = (-1 if usual.reverse else 1) * edge_speed(edges, turns, turns_per_s, k * a.period_s)
@@ -129,7 +131,7 @@ def convert(around, memory, k):
         memory.peak[0] = max(memory.peak[0], abs(currents[leg]))
     for x in range(3):
         memory.codes[2 + x] = current_code(a.sensors, x, a.polarity[x] * currents[a.sensed[x]], k)
-    memory.codes[5] = u_dc_code(a.sensors, a.u_dc, k)
+    memory.codes[5] = u_dc_code(a.sensors, memory.u_dc[0], k)
 
 
 @kernel
@@ -200,5 +202,7 @@ def advance(state, inputs, usual, around, memory, first, periods):
             latch_faults(m.flags, m.observed, usual.fault_ignore)
         times, words = centred_gates(duties, a.dead_time_s, a.period_s)
         at_the_legs(words, a.legs, a.open_leg, run)
-        advance_switching(m.plant, a.params, times, words, a.u_dc, 0.0, a.period_s, -1.0)
+        advance_switching(m.plant, a.params, times, words, m.u_dc[0], 0.0, a.period_s, -1.0)
+        brake = state.of_brake_chopper.brake
+        m.u_dc[0] = advance_bus(m.u_dc[0], a.bus, a.source_v, m.plant[L.P_IN], brake, a.period_s)
     return state

@@ -8,8 +8,10 @@ from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
-from fluxproof.plant import FREE, Inverter, Machine, Sensors, SwitchingPlant, sensor_params
+from fluxproof.plant import FREE, Bus, Inverter, Machine, Sensors, SwitchingPlant, sensor_params
 from fluxproof.plant.sensors import current_code, position_code, u_dc_code
+from golden_model import supply
+from golden_model.drive import Drive
 from golden_model.io import sample_latch
 from golden_model.kernel import kernel
 
@@ -73,6 +75,14 @@ PLANT_SIGNALS = {
     "omega_m": lambda p: p.omega_m,
     "torque": lambda p: p.torque,
 }
+
+
+def bus_of(drive: Drive) -> Bus:
+    """The bus that [supply] describes."""
+    if drive.supply.source == "ideal":
+        return Bus()
+    farad, diode = drive.supply.capacitance_f, drive.supply.source == "diode"
+    return Bus(farad, supply.resistance_ohm(drive), diode, supply.brake_resistor_ohm(drive))
 
 
 def described_sensors(drive) -> Sensors:

@@ -26,7 +26,7 @@ from fluxproof.plant import (
 )
 from fluxproof.plant import layout as L
 from fluxproof.plant.jit import SOURCE_HASH
-from fluxproof.plant.sensors import current_code, position_code, u_dc_code
+from fluxproof.plant.sensors import current_code, position_code, sensed_angle, u_dc_code
 from golden_model import fluxproof
 from golden_model.kernel import CACHE_DIR, kernel
 from golden_model.units import TURN_RAD
@@ -128,7 +128,7 @@ def position(bench, number):
     b, plant_state = bench, bench.plant_state
     if b.edges.speed[HALL] == 0.0:
         return position_code(b.sensors, plant_state[L.THETA_M], number), b.registers.omega_given
-    turns = (b.sensors.direction * plant_state[L.THETA_M] + b.sensors.position_offset) / TURN_RAD
+    turns = sensed_angle(b.sensors, plant_state[L.THETA_M]) / TURN_RAD
     turns_per_s, now = b.sensors.direction * plant_state[L.OMEGA_M] / TURN_RAD, number * b.period_s
     sense = -1 if b.registers.reverse else 1
     omega = sense * edge_speed(b.edges, turns, turns_per_s, now)

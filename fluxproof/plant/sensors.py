@@ -151,14 +151,20 @@ def u_dc_code(sensors, u_dc, sample):
 
 
 @njit
-def position_code(sensors, theta_m, sample):
-    """Code 0..2^bits - 1 of the mechanical angle [rad] at a sample number."""
+def sensed_angle(sensors, theta_m):
+    """Where the encoder's disc or the Hall sensors show the shaft [rad], without noise and counts."""
     seen = sensors.direction * theta_m + sensors.position_offset
     if sensors.once != 0.0:
         seen += sensors.once * math.sin(theta_m + sensors.once_phase)
     if sensors.twice != 0.0:
         seen += sensors.twice * math.sin(2.0 * theta_m + sensors.twice_phase)
-    seen += _noise(sensors.position_noise, sensors.seed, 4, sample)
+    return seen
+
+
+@njit
+def position_code(sensors, theta_m, sample):
+    """Code 0..2^bits - 1 of the mechanical angle [rad] at a sample number."""
+    seen = sensed_angle(sensors, theta_m) + _noise(sensors.position_noise, sensors.seed, 4, sample)
     turns = seen / (2.0 * math.pi)
     codes = 1 << sensors.position_bits
     part = turns - math.floor(turns)

@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fluxproof.cosim.driven_plant import described_sensors
+from fluxproof.cosim.driven_plant import bus_of, described_sensors
 from fluxproof.cosim.golden_loop import simulate
 from fluxproof.cosim.sensor_edges import edges_of
-from fluxproof.plant import FREE, IMPOSED_SPEED, Bus, Inverter, Machine, Sensors
+from fluxproof.plant import FREE, IMPOSED_SPEED, Inverter, Machine, Sensors
 from fluxproof.simulate.scene import Scene
-from golden_model import supply
 from golden_model.drive import Drive
-from golden_model.io.fault_latch import NAMES
+from golden_model.io import fault_latch
 from golden_model.registers import RegisterSet
 from golden_model.units import to_si
 
@@ -68,14 +67,6 @@ def sensors_of(drive: Drive) -> Sensors:
     )
 
 
-def bus_of(drive: Drive) -> Bus:
-    """The bus that [supply] describes."""
-    if drive.supply.source == "ideal":
-        return Bus()
-    farad, diode = drive.supply.capacitance_f, drive.supply.source == "diode"
-    return Bus(farad, supply.resistance_ohm(drive), diode, supply.brake_resistor_ohm(drive))
-
-
 def run(
     drive: Drive,
     register_set: RegisterSet,
@@ -84,12 +75,12 @@ def run(
 ) -> Run:
     """Carry the scene out; from the sample after a trip on the gates are off, as the fault latch has it."""
     result = _simulate(drive, register_set, scene, progress)
-    trips = np.flatnonzero(result.observed["sample_trip"])
+    causes = fault_latch.of_sample(result.observed) & ~register_set.values.fault_ignore & fault_latch.TRIPPING
+    trips = np.flatnonzero(causes * (scene.scenario.enable != 0))
     tripped_at, faults = None, ()
     if len(trips):
         tripped_at = int(trips[0])
-        bits = int(result.observed["sample_faults"][tripped_at]) & ~register_set.values.fault_ignore
-        faults = tuple(name for k, name in enumerate(NAMES) if bits >> k & 1)
+        faults = tuple(name for k, name in enumerate(fault_latch.NAMES) if int(causes[tripped_at]) >> k & 1)
         enable = scene.scenario.enable.copy()
         enable[tripped_at:] = 0
         scene = replace(scene, scenario=replace(scene.scenario, enable=enable))

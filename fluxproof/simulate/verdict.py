@@ -15,6 +15,7 @@ from fluxproof.simulate.scene import Stage
 from golden_model import supply
 from golden_model.drive import Drive
 from golden_model.protection_limits import regen_end_v
+from golden_model.registers import registers
 from golden_model.scaling import leg_loss_v
 
 MOST_KEYS = 8  # of [plant.*], in a line
@@ -32,7 +33,7 @@ def judge(drive: Drive, loops: dict[str, Margins], runs: list[Run]) -> tuple[str
         if run.tripped_at is not None:
             stage = next(s for s in run.scene.stages if s.first <= run.tripped_at < s.end)
             at = f"at {run.t[run.tripped_at] * 1e3:.1f} ms, in the stage {stage.name!r}"
-            return "tripped", f"tripped by {', '.join(run.faults)} {at}"
+            return "tripped", f"tripped by {', '.join(run.faults)} {at}{_overspeed(drive, run)}"
     for run in runs:
         reason = unsettled(drive, run)
         if reason:
@@ -41,6 +42,16 @@ def judge(drive: Drive, loops: dict[str, Margins], runs: list[Run]) -> tuple[str
     margin = loops[slow].phase_margin_deg
     least = "" if margin is None else f"; least phase margin {margin:.0f} degrees, {slow}"
     return "ok", f"stable in every stage, no trip{least}"
+
+
+def _overspeed(drive: Drive, run: Run) -> str:
+    """What sets the limit that the speed has passed, and what keeps below it."""
+    if "overspeed" not in run.faults:
+        return ""
+    limit = next(row.represented for row in registers(drive).rows if row.name == "omega_trip")
+    size = limit / drive.machine.pole_pairs * 30.0 / math.pi
+    keys = "[control] speed_bandwidth_hz for a smaller excursion, or [protection] overspeed_rad_s"
+    return f": the limit is {size:.4g} rpm; {keys}"
 
 
 def unsettled(drive: Drive, run: Run) -> str:

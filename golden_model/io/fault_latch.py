@@ -41,6 +41,12 @@ TRIPPING = FLAGS.hi - (1 << EARLY)
 HELD = 16  # clocks: longer than a write takes from the pins of the bus to clear_trip, and a trip pin to the latch
 
 
+def of_sample(values):
+    """The flags that a sample's values raise, by their names in Observed: integers or arrays."""
+    found = values["sample_faults"] + (values["motion_faults"] << MOTION) + (values["open_load"] << OPEN)
+    return found + (values["current_offset"] << OFFSET) + (values["encoder_lost"] << ENCODER)
+
+
 class State(NamedTuple):
     flags: int = 0
     first: int = 0

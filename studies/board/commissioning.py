@@ -20,6 +20,7 @@ from fluxproof.fleet.engine import in_parallel
 from studies.board.motors import CLASSES, Case, case
 
 COUNT = 100
+ACCEPTED = 0.98  # of sound motors
 TARGETS = {  # error of an accepted motor: (largest, unit)
     "encoder angle": (3.0, "degrees electrical"),
     "current offset": (1.0, "LSB rms"),
@@ -159,16 +160,30 @@ def _faulty(job: tuple[str, int]) -> tuple[bool, str, float]:
     return refused(name, case(seed))
 
 
-def figures(count: int = COUNT, faults_of: int = 3, say: Callable[[str], None] = lambda text: None) -> list[dict]:
-    """[{figure, ours, target, unit, pass}]: ``count`` motors, every fault on ``faults_of`` of them."""
+def figures(
+    count: int = COUNT, faults_of: int = 3, say: Callable[[str], None] = lambda text: None, jobs: int | None = None
+) -> list[dict]:
+    """[{figure, ours, target, unit, pass}]: ``count`` motors, every fault on ``faults_of``; ``jobs`` at once."""
     by_seed, began = {}, time.monotonic()
-    for seed, outcome in in_parallel(_motor, list(range(count)), None, "motors"):
+    for seed, outcome in in_parallel(_motor, list(range(count)), jobs, "motors"):
         by_seed[seed] = outcome
         say(f"motor {seed}: {_line(outcome)} ({time.monotonic() - began:.0f} s)")
-    outcomes = [by_seed[seed] for seed in range(count)]
+    wrong_boards, refusals = [(name, 1000 + n) for name in FAULTS for n in range(faults_of)], []
+    for (name, seed), outcome in in_parallel(_faulty, wrong_boards, jobs, "faults"):
+        ok, said, current = outcome
+        refusals.append(outcome)
+        verdict = "refused" if ok else "MISSED"
+        say(f"{name}, motor {seed}: {verdict}: {said}; current {current:.2f} of the limit")
+    return judged([by_seed[seed] for seed in range(count)], refusals)
+
+
+def judged(outcomes: list[Outcome], refusals: list[tuple[bool, str, float]]) -> list[dict]:
+    """The figures of motors and of wrong boards."""
+    count = len(outcomes)
     accepted = [o for o in outcomes if o.reason is None]
+    least = math.ceil(ACCEPTED * count)
     rows = [
-        row("commissioning: motors accepted", len(accepted), f"{count} of {count}", "motors", len(accepted) == count)
+        row("commissioning: motors accepted", len(accepted), f">= {least} of {count}", "motors", len(accepted) >= least)
     ]
     for name, (most, unit) in TARGETS.items():
         worst = max((o.errors[name] for o in accepted), default=math.nan)
@@ -180,17 +195,11 @@ def figures(count: int = COUNT, faults_of: int = 3, say: Callable[[str], None] =
     ratios = [abs(v) for o in accepted for v in o.ratio.values()]
     within = 100.0 * float(np.mean(np.array(ratios) <= 2.0)) if ratios else math.nan
     rows.append(row("commissioning: errors within two sigma", round(within, 1), "no target", "%", within == within))
-    currents, right, told = [o.current for o in outcomes], 0, 0
-    wrong_boards = [(name, 1000 + n) for name in FAULTS for n in range(faults_of)]
-    for (name, seed), (ok, said, current) in in_parallel(_faulty, wrong_boards, None, "faults"):
-        verdict = "refused" if ok else "MISSED"
-        say(f"{name}, motor {seed}: {verdict}: {said}; current {current:.2f} of the limit")
-        right, told = right + ok, told + 1
-        currents.append(current)
+    right, told = sum(ok for ok, *_ in refusals), len(refusals)
     rows.append(
         row("commissioning: faults refused with their reason", right, f"{told} of {told}", "runs", right == told)
     )
-    most = max(currents)
+    most = max([o.current for o in outcomes] + [current for *_, current in refusals])
     rows.append(row("commissioning: largest current over the limit", round(most, 3), "<= 1", "1", most <= 1.0))
     return rows
 
@@ -205,5 +214,7 @@ def _line(o: Outcome) -> str:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m studies.board.commissioning", description=__doc__)
     parser.add_argument("count", type=int, nargs="?", default=COUNT, help="random motors")
-    for line in figures(parser.parse_args().count, say=lambda text: print(text, flush=True)):
+    parser.add_argument("--jobs", type=int, help="at once; one a core if not given")
+    given = parser.parse_args()
+    for line in figures(given.count, say=lambda text: print(text, flush=True), jobs=given.jobs):
         print(line)

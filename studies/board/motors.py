@@ -9,13 +9,17 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from fluxproof.commission.simulated import Board, SimulatedBus
-from fluxproof.cosim.driven_plant import described_sensors
+from fluxproof.cosim.driven_plant import bus_of, described_sensors
 from fluxproof.plant import Inverter, Machine
 from golden_model import drive as drives
 from golden_model.front_ends import Encoder
 
 # bus [V], rated current [A] from and to, PWM [Hz], dead time [s]
 CLASSES = ((24.0, 3.0, 20.0, 20e3, 300e-9), (80.0, 4.0, 40.0, 16e3, 500e-9), (560.0, 3.0, 40.0, 10e3, 2e-6))
+# Thresholds of switch and diode [V], part of the circle that a switch's slope takes at the rated current
+DEVICES = ((0.0, 0.1, 0.004), (0.0, 0.1, 0.004), (0.9, 0.8, 0.002))
+BRAKE_ON = 1.15  # of the bus: a brake resistor behind a rectifier, as the steps of torque brake
+UNEVEN_RAD = 1e-3  # electrical, once and half of it twice a turn: a disc that is a little off its centre
 CLOCK_HZ = 160e6
 COUNTS = (None, 4000, 4096, 10000)  # a turn; None: a code of 16 bits
 
@@ -65,13 +69,18 @@ def case(seed: int) -> Case:
     sign = -1.0 if reverse else 1.0
     bits, span = int(r.choice([12, 14, 16])), float(r.uniform(1.8, 2.5)) * current
     shift = r.uniform(-0.03, 0.03, 3)
+    v_switch, v_diode, slope = DEVICES[seed % len(CLASSES)]
+    slope *= circle / current
     true = drives.Drive(
         machine=machine,
-        inverter=drives.Inverter(volts, pwm, dead, 2.0 * dead),
+        inverter=drives.Inverter(
+            volts, pwm, dead, 2.0 * dead, v_switch_v=v_switch, v_diode_v=v_diode, r_switch_ohm=slope, r_diode_ohm=slope
+        ),
         control=drives.Control(min(500.0, pwm / 40.0), speed_bandwidth_hz=10.0, speed_filter_hz=300.0),
         sensors=drives.Sensors(bits, span, 2.0 * volts, 16),
         core=drives.Core(CLOCK_HZ),
         encoder=Encoder() if counts is None else Encoder("abz", counts),
+        protection=drives.Protection(brake_on_v=BRAKE_ON * volts),
     )
     sensors = replace(
         described_sensors(true),
@@ -79,10 +88,19 @@ def case(seed: int) -> Case:
         current_noise_a=float(r.uniform(2e-4, 8e-4)) * span,
         position_offset_rad=offset,
         position_direction=-1 if reverse else 1,
+        eccentricity_once_rad=UNEVEN_RAD / pairs,
+        eccentricity_twice_rad=0.5 * UNEVEN_RAD / pairs,
+        eccentricity_twice_phase_rad=1.0,
         seed=seed,
     )
     board = Board(
-        Machine.from_mapping(asdict(machine)), Inverter(), dead, sensors, theta_m=float(r.uniform(0.0, 6.28)), seed=seed
+        Machine.from_mapping(asdict(machine)),
+        Inverter(0.0, v_switch, v_diode, slope, slope),
+        dead,
+        sensors,
+        bus=bus_of(true),
+        theta_m=float(r.uniform(0.0, 6.28)),
+        seed=seed,
     )
     of_l = 4.0 ** r.uniform(-0.5, 0.5)
     wrong = replace(
