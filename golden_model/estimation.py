@@ -100,6 +100,7 @@ class Seen(NamedTuple):
     u_q: int
     sat_d: int
     sat_q: int
+    by_voltage: int  # 1: the regulators only follow, they show neither flux nor loss
 
 
 class Estimated(NamedTuple):
@@ -195,12 +196,13 @@ def step(state, given, seen, sample, regs, config):
         ),
         r,
     )  # fmt: skip
+    shown = 1 if voltage_known and not v.by_voltage else 0
     factor, n_omega = speed_reciprocal.step(v.omega_me, r.omega_min, r.k_ramp)
     delta_state, (delta_lambda_d, delta_lambda_q, delta_held, delta_limited) = delta_lambda.step(
         state.of_delta_lambda,
         delta_lambda.Inputs(
             u_int_d=v.u_int_d, u_int_q=v.u_int_q, i_d=v.i_d, i_q=v.i_q, sat_d=v.sat_d, sat_q=v.sat_q,
-            current_at_rail=v.current_at_rail, voltage_known=voltage_known, run=x.run, factor=factor,
+            current_at_rail=v.current_at_rail, voltage_known=shown, run=x.run, factor=factor,
             n_omega=n_omega, r=g.r,
         ),
     )  # fmt: skip
@@ -218,7 +220,7 @@ def step(state, given, seen, sample, regs, config):
         state.of_v_dead_adaline,
         v_dead_adaline.Inputs(
             u_pi_d=v.u_pi_d, d_d=g.d_d, i_d=v.i_d, i_q=v.i_q, sat_d=v.sat_d, sat_q=v.sat_q,
-            current_at_rail=v.current_at_rail, voltage_known=voltage_known, run=x.run,
+            current_at_rail=v.current_at_rail, voltage_known=shown, run=x.run,
         ),
         r,
     )  # fmt: skip
