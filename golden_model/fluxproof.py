@@ -475,6 +475,14 @@ def step_table(state, sample, regs, config, of_speed, table):
         flux_mode = r.flux_mode
     by_table = c.references and r.use_table
     i_d_asked = state.i_d_table if by_table else x.i_d_ref
+    modes_state, (by_voltage, take_over, follows) = state.of_mode_change, (0, 0, 0)
+    i_d_source, i_q_used, begun = i_d_asked, x.i_q_ext, state.of_mode_references
+    if c.modes:
+        modes_state, (by_voltage, take_over, follows) = mode_change.step(
+            state.of_mode_change, x.speed_mode, r.position_mode if c.position_loop else 0, r.voltage_mode
+        )
+        i_d_asked = begun.i_d_now if begun.hold_d else i_d_source
+        i_q_used = begun.i_q_now if begun.hold_q or take_over else x.i_q_ext
     current_limit_state, (i_d_limited, i_q_max) = current_limit.step(state.of_current_limit, i_d_asked, r.i_max)
     most = state.torque_max if by_table else i_q_max
     position_state, (shaft_position, position_error, omega_asked, regulates) = (
@@ -493,14 +501,8 @@ def step_table(state, sample, regs, config, of_speed, table):
             ),
             c.position_bits,
         )  # fmt: skip
-    modes_state, (by_voltage, take_over, follows), i_q_now = state.of_mode_change, (0, 0, 0), x.i_q_ext
-    if c.modes:
-        modes_state, (by_voltage, take_over, follows) = mode_change.step(
-            state.of_mode_change, x.speed_mode, r.position_mode if c.position_loop else 0, r.voltage_mode
-        )
-        i_q_now = state.of_mode_references.i_q_now
     speed_pi_state, (torque_ref, speed_limited) = speed_pi.step(
-        state.of_speed_pi, omega_asked, omega_me, i_q_now, most, state.regen_limited, regulates, take_over, x.run,
+        state.of_speed_pi, omega_asked, omega_me, i_q_used, most, state.regen_limited, regulates, take_over, x.run,
         state.torque_ff, r.speed_kp, r.speed_ki,
     )  # fmt: skip
     i_q_asked, table_current_state = torque_ref, state.of_current_reference
@@ -531,7 +533,7 @@ def step_table(state, sample, regs, config, of_speed, table):
     u_dec_d, u_dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
     asked_d, asked_q, turned_d, turned_q = u_pi_d, u_pi_q, u_dec_d, u_dec_q
     if by_voltage:
-        asked_d, asked_q, turned_d, turned_q = state.of_mode_references.u_d_now, state.of_mode_references.u_q_now, 0, 0
+        asked_d, asked_q, turned_d, turned_q = begun.u_d_now, begun.u_q_now, 0, 0
     voltage_limit_state, (u_d, u_q, sat_d, sat_q) = voltage_limit.step(
         state.of_voltage_limit, asked_d, asked_q, turned_d, turned_q, given.u_comp_d, given.u_comp_q, u_max, lambda_d
     )
@@ -580,12 +582,12 @@ def step_table(state, sample, regs, config, of_speed, table):
     references_state, u_rest_d, u_rest_q = state.of_mode_references, 0, 0
     if c.modes:
         made = e.torque if by_table else i_q
-        references_state, (_, _, _, u_rest_d, u_rest_q) = mode_references.step(
+        references_state, (_, _, _, _, _, _, u_rest_d, u_rest_q) = mode_references.step(
             state.of_mode_references,
             mode_references.Inputs(
                 u_d=u_d, u_q=u_q, u_dec_d=u_dec_d, u_dec_q=u_dec_q, u_comp_d=given.u_comp_d, u_comp_q=given.u_comp_q,
-                i_q_ext=x.i_q_ext, i_q_made=made, torque_ref=torque_ref, by_voltage=by_voltage, regulates=regulates,
-                run=x.run,
+                i_d=i_d, i_q_made=made, i_d_source=i_d_source, i_q_ext=x.i_q_ext, torque_ref=torque_ref,
+                by_voltage=by_voltage, regulates=regulates, run=x.run,
             ),
             r,
         )  # fmt: skip

@@ -1,12 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The registers of voltage mode and of the changes between modes, see docs/modes.md.
-
-With the torque table the ramp of the torque is that of torque_ramp; i_step then does not limit.
-"""
+"""The registers of voltage mode and of the changes between modes, see docs/modes.md."""
 
 import math
 
-from golden_model.formats import PU
 from golden_model.scale_entry import Entry, base_keys
 
 
@@ -18,8 +14,7 @@ def modes(drive):
     yield Entry("u_d_ext", 0.0, "V", b.voltage_v, "none: the voltage of voltage mode")
     yield Entry("u_q_ext", 0.0, "V", b.voltage_v, "none: the voltage of voltage mode")
     circle = drive.inverter.dc_bus_v / math.sqrt(3.0)
-    keys = "[control] voltage_rise_s; [inverter] dc_bus_v, pwm_frequency_hz"
-    yield Entry("u_step", circle * min(t_s / c.voltage_rise_s, 1.0), "V", b.voltage_v, f"{keys}; {volts}")
-    step = drive.current_limit_a * min(t_s / c.torque_rise_s, 1.0)
-    step = PU.hi * PU.lsb * b.current_a if drive.core.references else step
-    yield Entry("i_step", step, "A", b.current_a, f"[control] torque_rise_s, current_limit_a; {amperes}")
+    keys = "[control] mode_change_s; [inverter] dc_bus_v, pwm_frequency_hz"
+    yield Entry("u_step", circle * min(t_s / c.mode_change_s, 1.0), "V", b.voltage_v, f"{keys}; {volts}")
+    step = drive.current_limit_a * min(t_s / c.mode_change_s, 1.0)
+    yield Entry("i_step", step, "A", b.current_a, f"[control] mode_change_s, current_limit_a; {amperes}")

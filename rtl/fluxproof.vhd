@@ -105,11 +105,12 @@ architecture rtl of fluxproof is
 
   -- From the position loop to the speed regulator
   signal omega_asked, torque_ff : signed(PU_W - 1 downto 0);
-  signal regulates, by_position : std_logic;
+  signal regulates, position_acts : std_logic;
 
   -- From the modes to the regulators and to the circle
   signal by_voltage, take_over, follows       : std_logic;
-  signal i_q_now, i_q_made                    : signed(PU_W - 1 downto 0);
+  signal i_q_used, i_q_made                   : signed(PU_W - 1 downto 0);
+  signal i_d_source                           : signed(PU_W - 1 downto 0);
   signal u_rest_d, u_rest_q                   : signed(PU_W - 1 downto 0);
   signal asked_d, asked_q, turned_d, turned_q : signed(PU_W - 1 downto 0);
 
@@ -220,7 +221,7 @@ begin
     signal omega_ff       : signed(INTEGRAL_W - 1 downto 0);
     signal at_rest        : std_logic;
   begin
-    by_position <= settings.position_mode;
+    position_acts <= settings.position_mode;
 
     position_regulator : entity work.position_control
       generic map (POSITION_BITS => POSITION_BITS)
@@ -244,7 +245,7 @@ begin
                 out_valid => open, position_ref => position_ref, omega_ff => omega_ff, torque_ff => torque_ff,
                 at_rest => at_rest);
   else generate
-    by_position      <= '0';
+    position_acts    <= '0';
     omega_asked      <= omega_ref;
     regulates        <= speed_mode;
     torque_ff        <= (others => '0');
@@ -253,23 +254,27 @@ begin
   end generate by_position;
 
   by_mode : if MODES = 1 generate
-    signal u_d_now, u_q_now : signed(PU_W - 1 downto 0);
+    signal u_d_now, u_q_now, i_d_now, i_q_now : signed(PU_W - 1 downto 0);
+    signal hold_d, hold_q                     : std_logic;
   begin
     modes : entity work.mode_change
       port map (clk => clk, rst => rst, in_valid => latch_valid,
-                speed_mode => speed_mode, by_position => by_position,
+                speed_mode => speed_mode, by_position => position_acts,
                 voltage_mode => settings.voltage_mode,
                 out_valid => open, by_voltage => by_voltage, take_over => take_over, follows => follows);
 
     beginnings : entity work.mode_references
       port map (clk => clk, rst => rst, in_valid => dq_voltage_valid,
                 u_d => o.u_d, u_q => o.u_q, u_dec_d => o.u_dec_d, u_dec_q => o.u_dec_q, u_comp_d => e.u_comp_d,
-                u_comp_q => e.u_comp_q, i_q_ext => i_q_ext, i_q_made => i_q_made, torque_ref => torque_ref,
-                by_voltage => by_voltage, regulates => regulates, run => run,
+                u_comp_q => e.u_comp_q, i_d => o.i_d, i_q_made => i_q_made, i_d_source => i_d_source,
+                i_q_ext => i_q_ext, torque_ref => torque_ref, by_voltage => by_voltage, regulates => regulates, run => run,
                 u_d_ext => settings.u_d_ext, u_q_ext => settings.u_q_ext, u_step => settings.u_step,
                 i_step => settings.i_step,
-                out_valid => open, u_d_now => u_d_now, u_q_now => u_q_now, i_q_now => i_q_now, u_rest_d => u_rest_d,
-                u_rest_q => u_rest_q);
+                out_valid => open, u_d_now => u_d_now, u_q_now => u_q_now, i_d_now => i_d_now, i_q_now => i_q_now,
+                hold_d => hold_d, hold_q => hold_q, u_rest_d => u_rest_d, u_rest_q => u_rest_q);
+
+    i_d_asked <= i_d_now when hold_d = '1' else i_d_source;
+    i_q_used  <= i_q_now when hold_q = '1' or take_over = '1' else i_q_ext;
 
     asked_d  <= u_d_now when by_voltage = '1' else u_pi_d;
     asked_q  <= u_q_now when by_voltage = '1' else u_pi_q;
@@ -279,7 +284,8 @@ begin
     by_voltage <= '0';
     take_over  <= '0';
     follows    <= '0';
-    i_q_now    <= i_q_ext;
+    i_d_asked  <= i_d_source;
+    i_q_used   <= i_q_ext;
     u_rest_d   <= (others => '0');
     u_rest_q   <= (others => '0');
     asked_d    <= u_pi_d;
@@ -290,7 +296,7 @@ begin
 
   speed_regulator : entity work.speed_pi
     port map (clk => clk, rst => rst, in_valid => omega_valid,
-              omega_ref => omega_asked, omega_me => o.omega_me, i_q_ext => i_q_now, i_q_max => torque_limit,
+              omega_ref => omega_asked, omega_me => o.omega_me, i_q_ext => i_q_used, i_q_max => torque_limit,
               regen_limited => o.regen_limited, speed_mode => regulates, take_over => take_over, run => run,
               torque_ff => torque_ff,
               speed_kp => settings.speed_kp, speed_ki => settings.speed_ki,
@@ -341,12 +347,12 @@ begin
                 use_table => settings.use_table,
                 out_valid => open, i_q_circle => i_q_circle);
 
-    i_d_asked    <= i_d_table when settings.use_table = '1' else i_d_ref;
+    i_d_source   <= i_d_table when settings.use_table = '1' else i_d_ref;
     torque_limit <= torque_max when settings.use_table = '1' else i_q_max;
     i_q_made     <= e.torque when settings.use_table = '1' else o.i_q;
     i_q_asked    <= i_q_circle when settings.use_table = '1' else torque_ref;
   else generate
-    i_d_asked    <= i_d_ref;
+    i_d_source   <= i_d_ref;
     torque_limit <= i_q_max;
     i_q_made     <= o.i_q;
     i_q_asked    <= torque_ref;

@@ -28,8 +28,7 @@ LOOK_S = 5e-3  # between two looks at the currents
 OF_HEARTBEAT, LEAST_HEARTBEAT_S = 1.0 / 3.0, 4.0 * LOOK_S  # longest wait without a write; what such a host can keep
 # Nothing that rests on the machine's data acts during commissioning, and no limit of a speed that is forced.
 QUIET = {"compensate": 0, "flux_mode": 0, "l_d": 0, "l_q": 0, "lambda_mg": 0, "emf_samples": 0, "residual_samples": 0}
-# Limits of the motion and of the sensors' zero, not yet known; the ramp of a torque, which would bend the steps
-OPEN_WIDE = ("omega_trip", "omega_away", "offset_max", "i_step")
+OPEN_WIDE = ("omega_trip", "omega_away", "offset_max")  # limits of the motion and of the sensors' zero, not yet known
 
 
 class Refusal(Exception):
