@@ -561,6 +561,7 @@ def step_table(state, sample, regs, config, of_speed, table):
             cos_theta=cos_theta, sin_theta=sin_theta, model_d=model_d, model_q=model_q, lambda_d=lambda_d,
             lambda_q=lambda_q, estimate_limited=estimate_limited, u_pi_d=u_pi_d, u_int_d=u_int_d, u_int_q=u_int_q,
             u_q=u_q, sat_d=sat_d, sat_q=sat_q, by_voltage=by_voltage,
+            resumes=1 if follows and not by_voltage else 0,
         )  # fmt: skip
         after, e = estimation.step(state, given, seen, x, r, c)
 

@@ -434,7 +434,8 @@ begin
     signal towards_alpha, towards_beta               : signed(PU_W - 1 downto 0);
     signal r                                         : unsigned(RESISTANCE_W - 1 downto 0);
     signal rho                                       : unsigned(RHO_W - 1 downto 0);
-    signal voltage_known, shown                      : std_logic;
+    signal voltage_known, loss_shown                 : std_logic;
+    signal regulated, resumes                        : std_logic;
     signal u_clean_alpha, u_clean_beta               : signed(FLUX_W - 1 downto 0);
     signal lambda_c_alpha, lambda_c_beta             : signed(FLUX_W - 1 downto 0);
     signal factor                                    : signed(17 downto 0);
@@ -447,7 +448,10 @@ begin
     signal delta_limited, compensation_limited       : std_logic;
   begin
     flux_mode <= settings.flux_mode;
-    shown     <= voltage_known and not by_voltage;  -- regulators that only follow show neither flux nor loss
+    -- Regulators that only follow show neither flux nor loss
+    regulated  <= run and not by_voltage;
+    resumes    <= follows and not by_voltage;
+    loss_shown <= voltage_known and not by_voltage;
 
     resistance : entity work.winding_resistance
       port map (clk => clk, rst => rst, in_valid => latch_valid,
@@ -539,7 +543,7 @@ begin
     flux_error : entity work.delta_lambda
       port map (clk => clk, rst => rst, in_valid => factor_valid,
                 u_int_d => o.u_int_d, u_int_q => o.u_int_q, i_d => o.i_d, i_q => o.i_q, sat_d => o.sat_d,
-                sat_q => o.sat_q, current_at_rail => o.current_at_rail, voltage_known => shown, run => run,
+                sat_q => o.sat_q, current_at_rail => o.current_at_rail, voltage_known => voltage_known, run => regulated,
                 factor => factor, n_omega => n_omega, r => r,
                 out_valid => delta_valid, delta_lambda_d => e.delta_lambda_d, delta_lambda_q => e.delta_lambda_q,
                 delta_held => e.delta_held, delta_limited => delta_limited);
@@ -547,6 +551,7 @@ begin
     compensation : entity work.flux_compensation
       port map (clk => clk, rst => rst, in_valid => delta_valid,
                 delta_lambda_d => e.delta_lambda_d, delta_lambda_q => e.delta_lambda_q, delta_held => e.delta_held,
+                before_d => e.lambda_pi_d, before_q => e.lambda_pi_q, resumes => resumes,
                 flux_mode => flux_mode, flux_kp => settings.flux_kp, flux_ki => settings.flux_ki,
                 delta_max => settings.delta_max,
                 out_valid => open, lambda_pi_d => e.lambda_pi_d, lambda_pi_q => e.lambda_pi_q,
@@ -569,7 +574,7 @@ begin
     inverter_loss : entity work.v_dead_adaline
       port map (clk => clk, rst => rst, in_valid => dq_voltage_valid,
                 u_pi_d => u_pi_d, d_d => e.d_d, i_d => o.i_d, i_q => o.i_q, sat_d => o.sat_d, sat_q => o.sat_q,
-                current_at_rail => o.current_at_rail, voltage_known => shown, run => run,
+                current_at_rail => o.current_at_rail, voltage_known => loss_shown, run => run,
                 k_lp => settings.k_lp, eta_v => settings.eta_v, gamma => settings.gamma, zeta => settings.zeta,
                 v_thr => settings.v_thr, v_comp_max => settings.v_comp_max, i_learn => settings.i_learn,
                 compensate => settings.compensate, v_start => settings.v_start,
