@@ -197,7 +197,7 @@ def step(state, given, seen, sample, regs, config):
         ),
         r,
     )  # fmt: skip
-    regulated = 1 if x.run and not v.by_voltage else 0
+    regulated, loss_shown = (0, 0) if v.by_voltage else (x.run, voltage_known)
     factor, n_omega = speed_reciprocal.step(v.omega_me, r.omega_min, r.k_ramp)
     delta_state, (delta_lambda_d, delta_lambda_q, delta_held, delta_limited) = delta_lambda.step(
         state.of_delta_lambda,
@@ -221,7 +221,7 @@ def step(state, given, seen, sample, regs, config):
         state.of_v_dead_adaline,
         v_dead_adaline.Inputs(
             u_pi_d=v.u_pi_d, d_d=g.d_d, i_d=v.i_d, i_q=v.i_q, sat_d=v.sat_d, sat_q=v.sat_q,
-            current_at_rail=v.current_at_rail, voltage_known=voltage_known if regulated else 0, run=x.run,
+            current_at_rail=v.current_at_rail, voltage_known=loss_shown, run=x.run,
         ),
         r,
     )  # fmt: skip

@@ -478,8 +478,9 @@ def step_table(state, sample, regs, config, of_speed, table):
     modes_state, (by_voltage, take_over, follows) = state.of_mode_change, (0, 0, 0)
     i_d_source, i_q_used, begun = i_d_asked, x.i_q_ext, state.of_mode_references
     if c.modes:
+        position_acts = 1 if c.position_loop and r.position_mode else 0
         modes_state, (by_voltage, take_over, follows) = mode_change.step(
-            state.of_mode_change, x.speed_mode, r.position_mode if c.position_loop else 0, r.voltage_mode
+            state.of_mode_change, x.speed_mode, position_acts, r.voltage_mode
         )
         i_d_asked = begun.i_d_now if begun.hold_d else i_d_source
         i_q_used = begun.i_q_now if begun.hold_q or take_over else x.i_q_ext
@@ -544,6 +545,7 @@ def step_table(state, sample, regs, config, of_speed, table):
         duty_a, duty_b, duty_c, r.min_pulse, r.double_update, c.carrier_half
     )
 
+    resumes = 1 if follows and not by_voltage else 0
     after, e = estimation.kept(state), NOTHING_ESTIMATED
     if c.estimators:
         towards_alpha, towards_beta = i_alpha, i_beta
@@ -561,7 +563,7 @@ def step_table(state, sample, regs, config, of_speed, table):
             cos_theta=cos_theta, sin_theta=sin_theta, model_d=model_d, model_q=model_q, lambda_d=lambda_d,
             lambda_q=lambda_q, estimate_limited=estimate_limited, u_pi_d=u_pi_d, u_int_d=u_int_d, u_int_q=u_int_q,
             u_q=u_q, sat_d=sat_d, sat_q=sat_q, by_voltage=by_voltage,
-            resumes=1 if follows and not by_voltage else 0,
+            resumes=resumes,
         )  # fmt: skip
         after, e = estimation.step(state, given, seen, x, r, c)
 
