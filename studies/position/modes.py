@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Changes between torque, voltage, speed and position mode under load: the step of the voltage, docs/modes.md.
 
-Each pair of modes is a run: speed mode to half speed against a load of half the rated torque, then the first mode, then
+Each pair of modes is a run: speed mode at half speed against a load of half the rated torque, then the first mode, then
 the second.  The references of both are what a careless host leaves: a fifth of the current, four fifths of the voltage,
 90 % of the speed, a target far away.
 """
@@ -22,7 +22,7 @@ from golden_model.units import TURN_RAD, from_si, to_si
 from studies.position.drives import moves, positioned
 
 MODES = ("torque", "voltage", "speed", "position")
-FIRST_S, CHANGE_S, END_S = 0.4, 0.5, 0.56
+FIRST_S, CHANGE_S, END_S = 0.2, 0.3, 0.36
 LOAD = 0.5  # of the rated torque
 STEP_SAMPLES = 3  # from the change on: what later samples do is a regulator's answer
 
@@ -48,6 +48,7 @@ def change(drive, before: str, after: str):
     omega = from_si("omega_ref", speed * m.pole_pairs, drive)
     scenario = dataclasses.replace(
         moves(drive, n * t_s, {}),
+        omega_m=speed,
         load=np.full(n, LOAD * 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a),
         speed_mode=(modes == "speed").astype(np.int64),
         omega_ref=np.where(np.arange(n) < first, omega, round(0.9 * omega)),
