@@ -476,12 +476,14 @@ def step_table(state, sample, regs, config, of_speed, table):
     by_table = c.references and r.use_table
     i_d_asked = state.i_d_table if by_table else x.i_d_ref
     modes_state, (by_voltage, take_over, follows) = state.of_mode_change, (0, 0, 0)
-    i_d_source, i_q_used, begun = i_d_asked, x.i_q_ext, state.of_mode_references
+    i_d_source, i_q_used, torque_ff_used = i_d_asked, x.i_q_ext, state.torque_ff
+    begun = state.of_mode_references
     if c.modes:
         position_acts = 1 if c.position_loop and r.position_mode else 0
         modes_state, (by_voltage, take_over, follows) = mode_change.step(
             state.of_mode_change, x.speed_mode, position_acts, r.voltage_mode
         )
+        torque_ff_used = state.torque_ff if position_acts else 0
         i_d_asked = begun.i_d_now if begun.hold_d else i_d_source
         i_q_used = begun.i_q_now if begun.hold_q or take_over else x.i_q_ext
     current_limit_state, (i_d_limited, i_q_max) = current_limit.step(state.of_current_limit, i_d_asked, r.i_max)
@@ -504,7 +506,7 @@ def step_table(state, sample, regs, config, of_speed, table):
         )  # fmt: skip
     speed_pi_state, (torque_ref, speed_limited) = speed_pi.step(
         state.of_speed_pi, omega_asked, omega_me, i_q_used, most, state.regen_limited, regulates, take_over, x.run,
-        state.torque_ff, r.speed_kp, r.speed_ki,
+        torque_ff_used, r.speed_kp, r.speed_ki,
     )  # fmt: skip
     i_q_asked, table_current_state = torque_ref, state.of_current_reference
     if c.references:

@@ -104,8 +104,9 @@ architecture rtl of fluxproof is
   signal i_d_asked, torque_limit, torque_ref : signed(PU_W - 1 downto 0);
 
   -- From the position loop to the speed regulator
-  signal omega_asked, torque_ff : signed(PU_W - 1 downto 0);
+  signal omega_asked, torque_ff   : signed(PU_W - 1 downto 0);
   signal regulates, position_acts : std_logic;
+  signal torque_ff_used           : signed(PU_W - 1 downto 0);
 
   -- From the modes to the regulators and to the circle
   signal by_voltage, take_over, follows       : std_logic;
@@ -275,6 +276,8 @@ begin
 
     i_d_asked <= i_d_now when hold_d = '1' else i_d_source;
     i_q_used  <= i_q_now when hold_q = '1' or take_over = '1' else i_q_ext;
+    -- The trajectory's torque of the sample before ends with position mode, not a sample after it
+    torque_ff_used <= torque_ff and position_acts;
 
     asked_d  <= u_d_now when by_voltage = '1' else u_pi_d;
     asked_q  <= u_q_now when by_voltage = '1' else u_pi_q;
@@ -286,6 +289,7 @@ begin
     follows    <= '0';
     i_d_asked  <= i_d_source;
     i_q_used   <= i_q_ext;
+    torque_ff_used <= torque_ff;
     u_rest_d   <= (others => '0');
     u_rest_q   <= (others => '0');
     asked_d    <= u_pi_d;
@@ -298,7 +302,7 @@ begin
     port map (clk => clk, rst => rst, in_valid => omega_valid,
               omega_ref => omega_asked, omega_me => o.omega_me, i_q_ext => i_q_used, i_q_max => torque_limit,
               regen_limited => o.regen_limited, speed_mode => regulates, take_over => take_over, run => run,
-              torque_ff => torque_ff,
+              torque_ff => torque_ff_used,
               speed_kp => settings.speed_kp, speed_ki => settings.speed_ki,
               out_valid => reference_valid, i_q_ref => torque_ref, speed_limited => o.speed_limited);
 

@@ -2,8 +2,8 @@
 """Changes between torque, voltage, speed and position mode under load: the step of the voltage, docs/modes.md.
 
 Each pair of modes is a run: speed mode at half speed against a load of half the rated torque, then the first mode, then
-the second.  The references of both are what a careless host leaves: a fifth of the current, four fifths of the voltage,
-90 % of the speed, a target far away.
+the second.  The references of both are what a host leaves that does not look: four fifths of the current, nine
+tenths of the voltage and of the speed, a target far away.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from golden_model.units import TURN_RAD, from_si, to_si
 from studies.position.drives import moves, positioned
 
 MODES = ("torque", "voltage", "speed", "position")
-FIRST_S, CHANGE_S, END_S = 0.2, 0.3, 0.36
+FIRST_S, CHANGE_S, END_S = 0.2, 0.25, 0.3
 LOAD = 0.5  # of the rated torque
 STEP_SAMPLES = 3  # from the change on: what later samples do is a regulator's answer
 
@@ -52,13 +52,13 @@ def change(drive, before: str, after: str):
         load=np.full(n, LOAD * 1.5 * m.pole_pairs * m.magnet_flux_wb * m.rated_current_a),
         speed_mode=(modes == "speed").astype(np.int64),
         omega_ref=np.where(np.arange(n) < first, omega, round(0.9 * omega)),
-        i_q_ext=np.full(n, from_si("i_q_ext", 0.2 * current, drive)),
+        i_q_ext=np.full(n, from_si("i_q_ext", 0.8 * current, drive)),
     )
     chosen = {0: registers_of("speed"), first: registers_of(before), at: registers_of(after)}
     target = {"position_target": POSITION.hi}
     scenario = dataclasses.replace(scenario, changes={k: {**v, **target} for k, v in chosen.items()})
     values = {
-        "u_q_ext": from_si("u_q", 0.8 * emf, drive), "move_speed": round(speed * t_s / TURN_RAD * 2.0**34)
+        "u_q_ext": from_si("u_q", 0.9 * emf, drive), "move_speed": round(speed * t_s / TURN_RAD * 2.0**34)
     }  # fmt: skip
     return scenario, values, at
 

@@ -8,8 +8,8 @@ decoupling, voltage circle, dead time and measurement are those of the project's
 
 * duty feedback: MTPA, and a weakening current that grows with the voltage over 90 % of the circle, in the manner of
   vedderb/bldc (``foc_run_fw``), ramped over 50 ms;
-* Newton: MTPA, and where its flux linkage is beyond u_max/omega the point of torque and flux limit by Newton's method, or
-  the largest torque within both limits, in the manner of FluxWeaken.c of Infineon's motor-ctrl-lib;
+* Newton: MTPA, and where its flux linkage is beyond u_max/omega the point of torque and flux limit by Newton's method,
+  or the largest torque within both limits, in the manner of FluxWeaken.c of Infineon's motor-ctrl-lib;
 * motulator: its CurrentReference as it is, fed with the unlimited voltage.
 """
 
