@@ -19,6 +19,7 @@ from golden_model.control.position_control import POSITION
 from golden_model.motion import limits, to_position
 from golden_model.registers import registers
 from golden_model.units import TURN_RAD, from_si, to_si
+from studies.position import figures
 from studies.position.drives import moves, positioned
 
 MODES = ("torque", "voltage", "speed", "position")
@@ -73,6 +74,18 @@ def steps(drive, observed: Mapping[str, np.ndarray], at: int) -> tuple[float, fl
 def pairs() -> Iterator[tuple[str, str]]:
     """Every mode before every other."""
     return ((a, b) for a in MODES for b in MODES if a != b)
+
+
+def rows_of(name: str) -> Iterator[dict]:
+    """The step at each change of a drive, beside the largest of a sample in the 50 ms before it."""
+    drive = with_modes(figures.case(name))
+    for before, after in pairs():
+        scenario, values, at = change(drive, before, after)
+        run = figures.play(drive, scenario, **values)
+        step, usual = steps(drive, run.observed, at)
+        assert not np.any(run.observed["sample_trip"])
+        what = f"step of the voltage, {before} to {after}, over the largest before"
+        yield figures.row(f"{name}, modes", what, step / usual, 1.5, "1")
 
 
 def every_change(carrier_half: int, periods: int, references: bool = False) -> ClosedLoop:
