@@ -100,6 +100,8 @@ class Seen(NamedTuple):
     u_q: int
     sat_d: int
     sat_q: int
+    by_voltage: int  # 1: the regulators only follow, they show neither flux nor loss
+    resumes: int  # 1: first sample after such
 
 
 class Estimated(NamedTuple):
@@ -195,18 +197,19 @@ def step(state, given, seen, sample, regs, config):
         ),
         r,
     )  # fmt: skip
+    regulated, loss_shown = (0, 0) if v.by_voltage else (x.run, voltage_known)
     factor, n_omega = speed_reciprocal.step(v.omega_me, r.omega_min, r.k_ramp)
     delta_state, (delta_lambda_d, delta_lambda_q, delta_held, delta_limited) = delta_lambda.step(
         state.of_delta_lambda,
         delta_lambda.Inputs(
             u_int_d=v.u_int_d, u_int_q=v.u_int_q, i_d=v.i_d, i_q=v.i_q, sat_d=v.sat_d, sat_q=v.sat_q,
-            current_at_rail=v.current_at_rail, voltage_known=voltage_known, run=x.run, factor=factor,
+            current_at_rail=v.current_at_rail, voltage_known=voltage_known, run=regulated, factor=factor,
             n_omega=n_omega, r=g.r,
         ),
     )  # fmt: skip
     compensation_state, compensated = flux_compensation.step(
-        state.of_flux_compensation, delta_lambda_d, delta_lambda_q, delta_held, r.flux_mode, r.flux_kp, r.flux_ki,
-        r.delta_max,
+        state.of_flux_compensation, delta_lambda_d, delta_lambda_q, delta_held, state.lambda_pi_d, state.lambda_pi_q,
+        v.resumes, r.flux_mode, r.flux_kp, r.flux_ki, r.delta_max,
     )  # fmt: skip
     lambda_pi_d, lambda_pi_q, lambda_add_d, lambda_add_q, compensation_limited = compensated
     (torque_me,) = torque.step(v.lambda_d, v.lambda_q, v.i_d, v.i_q)
@@ -218,7 +221,7 @@ def step(state, given, seen, sample, regs, config):
         state.of_v_dead_adaline,
         v_dead_adaline.Inputs(
             u_pi_d=v.u_pi_d, d_d=g.d_d, i_d=v.i_d, i_q=v.i_q, sat_d=v.sat_d, sat_q=v.sat_q,
-            current_at_rail=v.current_at_rail, voltage_known=voltage_known, run=x.run,
+            current_at_rail=v.current_at_rail, voltage_known=loss_shown, run=x.run,
         ),
         r,
     )  # fmt: skip

@@ -18,6 +18,8 @@ from golden_model.control import (
     dead_time_compensation,
     decoupling,
     flux_limit,
+    mode_change,
+    mode_references,
     position_control,
     position_trajectory,
     reference_table,
@@ -85,10 +87,11 @@ WIRING = {
     "trig": (sincos, ("angle", "delay")),
     "rotor_frame": (park, ("stator_frame", "trig")),
     "current_circle": (current_limit, ("latch",)),
+    "modes": (mode_change, ("latch",)),
     "table_current": (current_reference, ("current_circle",)),
     "position_regulator": (position_control, ("latch",)),
     "trajectory": (position_trajectory, ("position_regulator",)),
-    "speed_regulator": (speed_pi, ("speed_measurement", "current_circle", "position_regulator")),
+    "speed_regulator": (speed_pi, ("speed_measurement", "current_circle", "position_regulator", "modes")),
     "regeneration": (regeneration_limit, ("speed_regulator", "bus_voltage")),
     "flux_circle": (flux_limit, ("speed_measurement", "bus_voltage")),
     "ramp": (torque_ramp, ("speed_regulator",)),
@@ -104,6 +107,7 @@ WIRING = {
     "compensation_dq": (park, ("leg_compensation", "trig")),
     "direction_functions": (park, ("trig",)),
     "circle": (voltage_limit, ("current_regulators", "cross_coupling", "compensation_dq", "bus_voltage")),
+    "beginnings": (mode_references, ("circle",)),
     "stator_voltage": (inverse_park, ("circle", "trig")),
     "modulator": (svm, ("stator_voltage", "bus_reciprocal")),
     "compare": (pwm_compare, ("modulator",)),
@@ -196,6 +200,7 @@ Registers = namedtuple("Registers", list(REGISTERS))
 PARTS = {
     "references": ("flux_circle", "ramp", "references", "voltage_regulator", "map_correction", "table_current"),
     "position_loop": ("position_regulator", "trajectory", "towards"),
+    "modes": ("modes", "beginnings"),
     "residual": ("residual",),
 }
 PARTS["estimators"] = (
@@ -226,6 +231,7 @@ class Config(NamedTuple):
     references: int = 0  # 1: current references by a table of torque and flux limit
     position_loop: int = 0  # 1: a position loop over the speed loop, and its trajectory
     residual: int = 0  # 1: the residual of the motor beside its description, with the estimators
+    modes: int = 0  # 1: voltage mode, and changes of mode without a step of the voltage
 
 
 class Sample(NamedTuple):
@@ -312,6 +318,11 @@ class State(NamedTuple):
     torque_ff: int = 0
     at_rest: int = 0
     of_motor_residual: motor_residual.State = motor_residual.State()
+    # The modes' part, likewise
+    of_mode_change: mode_change.State = mode_change.State()
+    of_mode_references: mode_references.State = mode_references.State()
+    u_rest_d: int = 0
+    u_rest_q: int = 0
 
 
 class Observed(NamedTuple):
@@ -464,6 +475,17 @@ def step_table(state, sample, regs, config, of_speed, table):
         flux_mode = r.flux_mode
     by_table = c.references and r.use_table
     i_d_asked = state.i_d_table if by_table else x.i_d_ref
+    modes_state, (by_voltage, take_over, follows) = state.of_mode_change, (0, 0, 0)
+    i_d_source, i_q_used, torque_ff_used = i_d_asked, x.i_q_ext, state.torque_ff
+    begun = state.of_mode_references
+    if c.modes:
+        position_acts = 1 if c.position_loop and r.position_mode else 0
+        modes_state, (by_voltage, take_over, follows) = mode_change.step(
+            state.of_mode_change, x.speed_mode, position_acts, r.voltage_mode
+        )
+        torque_ff_used = state.torque_ff if position_acts else 0
+        i_d_asked = begun.i_d_now if begun.hold_d else i_d_source
+        i_q_used = begun.i_q_now if begun.hold_q or take_over else x.i_q_ext
     current_limit_state, (i_d_limited, i_q_max) = current_limit.step(state.of_current_limit, i_d_asked, r.i_max)
     most = state.torque_max if by_table else i_q_max
     position_state, (shaft_position, position_error, omega_asked, regulates) = (
@@ -483,8 +505,8 @@ def step_table(state, sample, regs, config, of_speed, table):
             c.position_bits,
         )  # fmt: skip
     speed_pi_state, (torque_ref, speed_limited) = speed_pi.step(
-        state.of_speed_pi, omega_asked, omega_me, x.i_q_ext, most, state.regen_limited, regulates, x.run,
-        state.torque_ff, r.speed_kp, r.speed_ki,
+        state.of_speed_pi, omega_asked, omega_me, i_q_used, most, state.regen_limited, regulates, take_over, x.run,
+        torque_ff_used, r.speed_kp, r.speed_ki,
     )  # fmt: skip
     i_q_asked, table_current_state = torque_ref, state.of_current_reference
     if c.references:
@@ -496,8 +518,12 @@ def step_table(state, sample, regs, config, of_speed, table):
         state.of_regeneration_limit, i_q_asked, omega_me, u_dc, r.i_max, r.regen_start, r.regen_slope
     )
     current_pi_state, (u_pi_d, u_pi_q, u_int_d, u_int_q) = current_pi.step(
-        state.of_current_pi, i_d, i_q, i_d_limited, i_q_ref, state.sat_d, state.sat_q, x.run, r.kp_d, r.ki_d, r.kp_q,
-        r.ki_q,
+        state.of_current_pi,
+        current_pi.Inputs(
+            i_d=i_d, i_q=i_q, i_d_ref=i_d_limited, i_q_ref=i_q_ref, sat_d=state.sat_d, sat_q=state.sat_q,
+            u_rest_d=state.u_rest_d, u_rest_q=state.u_rest_q, follows=follows, by_voltage=by_voltage, run=x.run,
+        ),
+        r,
     )  # fmt: skip
     model_d, model_q, merged_d, merged_q, merged, ended = flux_models.step(
         i_d, i_q, given.lambda_m_d, given.lambda_m_q, state.merge_known, x.run, given.minus_rho, flux_mode, r.l_d,
@@ -508,8 +534,11 @@ def step_table(state, sample, regs, config, of_speed, table):
     )
     (omega_chord,) = chord_speed.step(omega_me, r.k_chord)
     u_dec_d, u_dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
+    asked_d, asked_q, turned_d, turned_q = u_pi_d, u_pi_q, u_dec_d, u_dec_q
+    if by_voltage:
+        asked_d, asked_q, turned_d, turned_q = begun.u_d_now, begun.u_q_now, 0, 0
     voltage_limit_state, (u_d, u_q, sat_d, sat_q) = voltage_limit.step(
-        state.of_voltage_limit, u_pi_d, u_pi_q, u_dec_d, u_dec_q, given.u_comp_d, given.u_comp_q, u_max, lambda_d
+        state.of_voltage_limit, asked_d, asked_q, turned_d, turned_q, given.u_comp_d, given.u_comp_q, u_max, lambda_d
     )
 
     u_alpha, u_beta = inverse_park.step(u_d, u_q, cos_out, sin_out)
@@ -518,6 +547,7 @@ def step_table(state, sample, regs, config, of_speed, table):
         duty_a, duty_b, duty_c, r.min_pulse, r.double_update, c.carrier_half
     )
 
+    resumes = 1 if follows and not by_voltage else 0
     after, e = estimation.kept(state), NOTHING_ESTIMATED
     if c.estimators:
         towards_alpha, towards_beta = i_alpha, i_beta
@@ -534,7 +564,8 @@ def step_table(state, sample, regs, config, of_speed, table):
             u_dc_at_rail=u_dc_at_rail, u_dc_low=u_dc_low, omega_me=omega_me, omega_chord=omega_chord,
             cos_theta=cos_theta, sin_theta=sin_theta, model_d=model_d, model_q=model_q, lambda_d=lambda_d,
             lambda_q=lambda_q, estimate_limited=estimate_limited, u_pi_d=u_pi_d, u_int_d=u_int_d, u_int_q=u_int_q,
-            u_q=u_q, sat_d=sat_d, sat_q=sat_q,
+            u_q=u_q, sat_d=sat_d, sat_q=sat_q, by_voltage=by_voltage,
+            resumes=resumes,
         )  # fmt: skip
         after, e = estimation.step(state, given, seen, x, r, c)
 
@@ -551,6 +582,19 @@ def step_table(state, sample, regs, config, of_speed, table):
         correction_state, (torque_gain,) = torque_correction.step(
             state.of_torque_correction, torque_now, e.torque, omega_me, torque_limited, calm, x.run, r.k_torque,
             r.omega_learn,
+        )  # fmt: skip
+
+    references_state, u_rest_d, u_rest_q = state.of_mode_references, 0, 0
+    if c.modes:
+        made = e.torque if by_table else i_q
+        references_state, (_, _, _, _, _, _, u_rest_d, u_rest_q) = mode_references.step(
+            state.of_mode_references,
+            mode_references.Inputs(
+                u_d=u_d, u_q=u_q, u_dec_d=u_dec_d, u_dec_q=u_dec_q, u_comp_d=given.u_comp_d, u_comp_q=given.u_comp_q,
+                i_d=i_d, i_q_made=made, i_d_source=i_d_source, i_q_ext=x.i_q_ext, torque_ref=torque_ref,
+                by_voltage=by_voltage, regulates=regulates, run=x.run,
+            ),
+            r,
         )  # fmt: skip
 
     trajectory_state, (position_ref, omega_ff, torque_ff, at_rest) = state.of_position_trajectory, (0, 0, 0, 0)
@@ -612,7 +656,8 @@ def step_table(state, sample, regs, config, of_speed, table):
         regen_limited=regen_limited, of_regeneration_limit=regeneration_state,
         of_position_control=position_state, of_position_trajectory=trajectory_state, position_ref=position_ref,
         omega_ff=omega_ff, torque_ff=torque_ff, at_rest=at_rest,
-        of_motor_residual=after.of_motor_residual,
+        of_motor_residual=after.of_motor_residual, of_mode_change=modes_state, of_mode_references=references_state,
+        u_rest_d=u_rest_d, u_rest_q=u_rest_q,
     )  # fmt: skip
     return following, Observed(
         i_a=i_a, i_b=i_b, i_c=i_c, current_at_rail=current_at_rail, u_dc=u_dc, u_max=u_max, u_dc_at_rail=u_dc_at_rail,

@@ -25,6 +25,7 @@ docs/board.md.
 
 import math
 
+from golden_model.mode_scaling import modes
 from golden_model.motion import position_loop
 from golden_model.protection_limits import protection
 from golden_model.scale_entry import Entry, base_keys, leg_loss_v
@@ -253,4 +254,4 @@ def gates(drive):
     yield Entry("double_update", drive.core.updates_per_period - 1, "1", 1.0, "[core] updates_per_period")
 
 
-PARTS = (sensing, speed_loop, current_loop, flux_estimator, vsi_estimators, gates, position_loop, protection)
+PARTS = (sensing, speed_loop, current_loop, flux_estimator, vsi_estimators, gates, position_loop, modes, protection)

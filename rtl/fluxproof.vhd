@@ -12,6 +12,7 @@
 -- table gives both current references at the flux limit of speed and bus voltage, see control/reference_table.vhd.
 -- POSITION_LOOP = 1 builds a position loop over the speed loop and the trajectory that it follows, used with
 -- position_mode, see control/position_trajectory.vhd.
+-- MODES = 1 builds voltage mode and changes of mode without a step of the voltage, see control/mode_references.vhd.
 -- RESIDUAL = 1 compares the motor with its description, see estimators/motor_residual.vhd.
 -- Formats: per unit, see golden_model/formats.py; settings as `fluxproof registers drive.toml` prints them.
 -- Latency: sample_valid to duty_valid FLUXPROOF_SAMPLE_TO_DUTY clocks; samples FLUXPROOF_SAMPLE_INTERVAL or more apart.
@@ -34,7 +35,8 @@ entity fluxproof is
     ESTIMATORS    : natural range 0 to 1      := 1;  -- 0: field-oriented control alone
     REFERENCES    : natural range 0 to 1      := 0;  -- 1: current references by a table of torque and flux limit
     POSITION_LOOP : natural range 0 to 1      := 0;  -- 1: a position loop over the speed loop, and its trajectory
-    RESIDUAL      : natural range 0 to 1      := 0  -- 1: the residual of the motor, with the estimators
+    RESIDUAL      : natural range 0 to 1      := 0;  -- 1: the residual of the motor, with the estimators
+    MODES         : natural range 0 to 1      := 0  -- 1: voltage mode, changes of mode without a step of the voltage
   );
   port (
     clk             : in  std_logic;
@@ -102,8 +104,16 @@ architecture rtl of fluxproof is
   signal i_d_asked, torque_limit, torque_ref : signed(PU_W - 1 downto 0);
 
   -- From the position loop to the speed regulator
-  signal omega_asked, torque_ff : signed(PU_W - 1 downto 0);
-  signal regulates              : std_logic;
+  signal omega_asked, torque_ff   : signed(PU_W - 1 downto 0);
+  signal regulates, position_acts : std_logic;
+  signal torque_ff_used           : signed(PU_W - 1 downto 0);
+
+  -- From the modes to the regulators and to the circle
+  signal by_voltage, take_over, follows       : std_logic;
+  signal i_q_used, i_q_made                   : signed(PU_W - 1 downto 0);
+  signal i_d_source                           : signed(PU_W - 1 downto 0);
+  signal u_rest_d, u_rest_q                   : signed(PU_W - 1 downto 0);
+  signal asked_d, asked_q, turned_d, turned_q : signed(PU_W - 1 downto 0);
 
   -- From the estimators to the control
   signal flux_mode              : unsigned(1 downto 0);
@@ -212,6 +222,8 @@ begin
     signal omega_ff       : signed(INTEGRAL_W - 1 downto 0);
     signal at_rest        : std_logic;
   begin
+    position_acts <= settings.position_mode;
+
     position_regulator : entity work.position_control
       generic map (POSITION_BITS => POSITION_BITS)
       port map (clk => clk, rst => rst, in_valid => latch_valid,
@@ -234,6 +246,7 @@ begin
                 out_valid => open, position_ref => position_ref, omega_ff => omega_ff, torque_ff => torque_ff,
                 at_rest => at_rest);
   else generate
+    position_acts    <= '0';
     omega_asked      <= omega_ref;
     regulates        <= speed_mode;
     torque_ff        <= (others => '0');
@@ -241,10 +254,55 @@ begin
     o.position_error <= (others => '0');
   end generate by_position;
 
+  by_mode : if MODES = 1 generate
+    signal u_d_now, u_q_now, i_d_now, i_q_now : signed(PU_W - 1 downto 0);
+    signal hold_d, hold_q                     : std_logic;
+  begin
+    modes : entity work.mode_change
+      port map (clk => clk, rst => rst, in_valid => latch_valid,
+                speed_mode => speed_mode, by_position => position_acts,
+                voltage_mode => settings.voltage_mode,
+                out_valid => open, by_voltage => by_voltage, take_over => take_over, follows => follows);
+
+    beginnings : entity work.mode_references
+      port map (clk => clk, rst => rst, in_valid => dq_voltage_valid,
+                u_d => o.u_d, u_q => o.u_q, u_dec_d => o.u_dec_d, u_dec_q => o.u_dec_q, u_comp_d => e.u_comp_d,
+                u_comp_q => e.u_comp_q, i_d => o.i_d, i_q_made => i_q_made, i_d_source => i_d_source,
+                i_q_ext => i_q_ext, torque_ref => torque_ref, by_voltage => by_voltage, regulates => regulates, run => run,
+                u_d_ext => settings.u_d_ext, u_q_ext => settings.u_q_ext, u_step => settings.u_step,
+                i_step => settings.i_step,
+                out_valid => open, u_d_now => u_d_now, u_q_now => u_q_now, i_d_now => i_d_now, i_q_now => i_q_now,
+                hold_d => hold_d, hold_q => hold_q, u_rest_d => u_rest_d, u_rest_q => u_rest_q);
+
+    i_d_asked <= i_d_now when hold_d = '1' else i_d_source;
+    i_q_used  <= i_q_now when hold_q = '1' or take_over = '1' else i_q_ext;
+    -- The trajectory's torque of the sample before ends with position mode, not a sample after it
+    torque_ff_used <= torque_ff and position_acts;
+
+    asked_d  <= u_d_now when by_voltage = '1' else u_pi_d;
+    asked_q  <= u_q_now when by_voltage = '1' else u_pi_q;
+    turned_d <= o.u_dec_d and not by_voltage;
+    turned_q <= o.u_dec_q and not by_voltage;
+  else generate
+    by_voltage <= '0';
+    take_over  <= '0';
+    follows    <= '0';
+    i_d_asked  <= i_d_source;
+    i_q_used   <= i_q_ext;
+    torque_ff_used <= torque_ff;
+    u_rest_d   <= (others => '0');
+    u_rest_q   <= (others => '0');
+    asked_d    <= u_pi_d;
+    asked_q    <= u_pi_q;
+    turned_d   <= o.u_dec_d;
+    turned_q   <= o.u_dec_q;
+  end generate by_mode;
+
   speed_regulator : entity work.speed_pi
     port map (clk => clk, rst => rst, in_valid => omega_valid,
-              omega_ref => omega_asked, omega_me => o.omega_me, i_q_ext => i_q_ext, i_q_max => torque_limit,
-              regen_limited => o.regen_limited, speed_mode => regulates, run => run, torque_ff => torque_ff,
+              omega_ref => omega_asked, omega_me => o.omega_me, i_q_ext => i_q_used, i_q_max => torque_limit,
+              regen_limited => o.regen_limited, speed_mode => regulates, take_over => take_over, run => run,
+              torque_ff => torque_ff_used,
               speed_kp => settings.speed_kp, speed_ki => settings.speed_ki,
               out_valid => reference_valid, i_q_ref => torque_ref, speed_limited => o.speed_limited);
 
@@ -293,12 +351,14 @@ begin
                 use_table => settings.use_table,
                 out_valid => open, i_q_circle => i_q_circle);
 
-    i_d_asked    <= i_d_table when settings.use_table = '1' else i_d_ref;
+    i_d_source   <= i_d_table when settings.use_table = '1' else i_d_ref;
     torque_limit <= torque_max when settings.use_table = '1' else i_q_max;
+    i_q_made     <= e.torque when settings.use_table = '1' else o.i_q;
     i_q_asked    <= i_q_circle when settings.use_table = '1' else torque_ref;
   else generate
-    i_d_asked    <= i_d_ref;
+    i_d_source   <= i_d_ref;
     torque_limit <= i_q_max;
+    i_q_made     <= o.i_q;
     i_q_asked    <= torque_ref;
   end generate by_table;
 
@@ -311,7 +371,7 @@ begin
   current_regulators : entity work.current_pi
     port map (clk => clk, rst => rst, in_valid => dq_soon,
               i_d => o.i_d, i_q => o.i_q, i_d_ref => i_d_limited, i_q_ref => o.i_q_ref, sat_d => o.sat_d, sat_q => o.sat_q,
-              run => run,
+              u_rest_d => u_rest_d, u_rest_q => u_rest_q, follows => follows, by_voltage => by_voltage, run => run,
               kp_d => settings.kp_d, ki_d => settings.ki_d, kp_q => settings.kp_q, ki_q => settings.ki_q,
               out_soon => open, out_valid => open, u_pi_d => u_pi_d, u_pi_q => u_pi_q, u_int_d => o.u_int_d,
               u_int_q => o.u_int_q);
@@ -344,7 +404,7 @@ begin
 
   circle : entity work.voltage_limit
     port map (clk => clk, rst => rst, in_valid => decoupling_valid,
-              u_pi_d => u_pi_d, u_pi_q => u_pi_q, u_dec_d => o.u_dec_d, u_dec_q => o.u_dec_q, u_comp_d => e.u_comp_d,
+              u_pi_d => asked_d, u_pi_q => asked_q, u_dec_d => turned_d, u_dec_q => turned_q, u_comp_d => e.u_comp_d,
               u_comp_q => e.u_comp_q, u_max => o.u_max, lambda_d => o.lambda_d,
               out_soon => dq_voltage_soon, out_valid => dq_voltage_valid, u_d => o.u_d, u_q => o.u_q, sat_d => o.sat_d,
               sat_q => o.sat_q);
@@ -378,7 +438,8 @@ begin
     signal towards_alpha, towards_beta               : signed(PU_W - 1 downto 0);
     signal r                                         : unsigned(RESISTANCE_W - 1 downto 0);
     signal rho                                       : unsigned(RHO_W - 1 downto 0);
-    signal voltage_known                             : std_logic;
+    signal voltage_known, loss_shown                 : std_logic;
+    signal regulated, resumes                        : std_logic;
     signal u_clean_alpha, u_clean_beta               : signed(FLUX_W - 1 downto 0);
     signal lambda_c_alpha, lambda_c_beta             : signed(FLUX_W - 1 downto 0);
     signal factor                                    : signed(17 downto 0);
@@ -391,6 +452,10 @@ begin
     signal delta_limited, compensation_limited       : std_logic;
   begin
     flux_mode <= settings.flux_mode;
+    -- Regulators that only follow show neither flux nor loss
+    regulated  <= run and not by_voltage;
+    resumes    <= follows and not by_voltage;
+    loss_shown <= voltage_known and not by_voltage;
 
     resistance : entity work.winding_resistance
       port map (clk => clk, rst => rst, in_valid => latch_valid,
@@ -482,7 +547,7 @@ begin
     flux_error : entity work.delta_lambda
       port map (clk => clk, rst => rst, in_valid => factor_valid,
                 u_int_d => o.u_int_d, u_int_q => o.u_int_q, i_d => o.i_d, i_q => o.i_q, sat_d => o.sat_d,
-                sat_q => o.sat_q, current_at_rail => o.current_at_rail, voltage_known => voltage_known, run => run,
+                sat_q => o.sat_q, current_at_rail => o.current_at_rail, voltage_known => voltage_known, run => regulated,
                 factor => factor, n_omega => n_omega, r => r,
                 out_valid => delta_valid, delta_lambda_d => e.delta_lambda_d, delta_lambda_q => e.delta_lambda_q,
                 delta_held => e.delta_held, delta_limited => delta_limited);
@@ -490,6 +555,7 @@ begin
     compensation : entity work.flux_compensation
       port map (clk => clk, rst => rst, in_valid => delta_valid,
                 delta_lambda_d => e.delta_lambda_d, delta_lambda_q => e.delta_lambda_q, delta_held => e.delta_held,
+                before_d => e.lambda_pi_d, before_q => e.lambda_pi_q, resumes => resumes,
                 flux_mode => flux_mode, flux_kp => settings.flux_kp, flux_ki => settings.flux_ki,
                 delta_max => settings.delta_max,
                 out_valid => open, lambda_pi_d => e.lambda_pi_d, lambda_pi_q => e.lambda_pi_q,
@@ -512,7 +578,7 @@ begin
     inverter_loss : entity work.v_dead_adaline
       port map (clk => clk, rst => rst, in_valid => dq_voltage_valid,
                 u_pi_d => u_pi_d, d_d => e.d_d, i_d => o.i_d, i_q => o.i_q, sat_d => o.sat_d, sat_q => o.sat_q,
-                current_at_rail => o.current_at_rail, voltage_known => voltage_known, run => run,
+                current_at_rail => o.current_at_rail, voltage_known => loss_shown, run => run,
                 k_lp => settings.k_lp, eta_v => settings.eta_v, gamma => settings.gamma, zeta => settings.zeta,
                 v_thr => settings.v_thr, v_comp_max => settings.v_comp_max, i_learn => settings.i_learn,
                 compensate => settings.compensate, v_start => settings.v_start,

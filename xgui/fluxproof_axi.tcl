@@ -12,6 +12,7 @@ proc init_gui {IPINST} {
   ipgui::add_param $IPINST -name "REFERENCES" -parent ${page}
   ipgui::add_param $IPINST -name "POSITION_LOOP" -parent ${page}
   ipgui::add_param $IPINST -name "RESIDUAL" -parent ${page}
+  ipgui::add_param $IPINST -name "MODES" -parent ${page}
   ipgui::add_param $IPINST -name "RING_ROWS" -parent ${page}
   ipgui::add_param $IPINST -name "GATE_ACTIVE" -parent ${page}
   ipgui::add_param $IPINST -name "TRIP_ACTIVE" -parent ${page}
@@ -105,6 +106,17 @@ proc validate_PARAM_VALUE.RESIDUAL {PARAM_VALUE.RESIDUAL} {
 
 proc update_MODELPARAM_VALUE.RESIDUAL {MODELPARAM_VALUE.RESIDUAL PARAM_VALUE.RESIDUAL} {
   set_property value [get_property value ${PARAM_VALUE.RESIDUAL}] ${MODELPARAM_VALUE.RESIDUAL}
+}
+
+proc update_PARAM_VALUE.MODES {PARAM_VALUE.MODES} {
+}
+
+proc validate_PARAM_VALUE.MODES {PARAM_VALUE.MODES} {
+  return true
+}
+
+proc update_MODELPARAM_VALUE.MODES {MODELPARAM_VALUE.MODES PARAM_VALUE.MODES} {
+  set_property value [get_property value ${PARAM_VALUE.MODES}] ${MODELPARAM_VALUE.MODES}
 }
 
 proc update_PARAM_VALUE.RING_ROWS {PARAM_VALUE.RING_ROWS} {

@@ -46,8 +46,8 @@ def test_current_regulator_products_are_volts(path):
     m, w_c = drive.machine, 2 * math.pi * drive.control.current_bandwidth_hz
     err = from_si("i_d", 0.1 * drive.sensors.current_range_a, drive)
     amperes = to_si("i_d", err, drive)
-    args = (current_pi.State(), 0, 0, err, err, 0, 0, 1, v.kp_d, v.ki_d, v.kp_q, v.ki_q)
-    _, (u_d, u_q, int_d, int_q) = current_pi.step(*args)
+    inputs = current_pi.Inputs(0, 0, err, err, 0, 0, 0, 0, 0, 0, 1)
+    _, (u_d, u_q, int_d, int_q) = current_pi.step(current_pi.State(), inputs, v)
     for axis, u, integral in (("d", u_d, int_d), ("q", u_q, int_q)):
         rise = w_c * m.resistance_ohm * drive.sample_time_s * amperes
         total = w_c * getattr(m, f"inductance_{axis}_h") * amperes + rise
@@ -61,7 +61,7 @@ def test_speed_regulator_product_is_amperes(path):
     result = registers(drive)
     v, kp = result.values, next(row.si for row in result.rows if row.name == "speed_kp")
     err = from_si("omega_ref", 0.5 * drive.current_limit_a / kp, drive)
-    _, (i_q_ref, limited) = speed_pi.step(speed_pi.State(), err, 0, 0, v.i_max, 0, 1, 1, 0, v.speed_kp, v.speed_ki)
+    _, (i_q_ref, limited) = speed_pi.step(speed_pi.State(), err, 0, 0, v.i_max, 0, 1, 0, 1, 0, v.speed_kp, v.speed_ki)
     expected = kp * to_si("omega_ref", err, drive)
     assert limited == 0
     assert to_si("i_q_ref", i_q_ref, drive) == pytest.approx(expected, rel=1e-4)

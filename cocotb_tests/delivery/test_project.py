@@ -216,12 +216,13 @@ def test_cells_are_those_that_were_counted():
         "position_loop": ("position", r"`position_\w+` ([\d,]+) LUT,.*?(\d) DSP48"),
         "references": ("speed_range", r"`\w+` (\d+) LUT, (\d) DSP48"),
         "residual": ("faults", r"The block takes ([\d,]+) LUT, .* (one) DSP48"),
+        "modes": ("modes", r"`mode_\w+` (\d+) (LUT)"),
         "ring_rows": ("telemetry", r"of 42 rows \| (\d+), \d+, (\d) "),
     }
     for key, (page, sentence) in told.items():
         found = re.findall(sentence, (ROOT / "docs" / f"{page}.md").read_text())
         lut = sum(int(n.replace(",", "")) for n, _ in found)
-        dsp = 0 if key == "ring_rows" else sum(1 if n == "one" else int(n) for _, n in found)
+        dsp = 0 if key in ("ring_rows", "modes") else sum(1 if n == "one" else int(n) for _, n in found)
         assert found and need.OPTIONS[key] == (lut, dsp), key
     page = (ROOT / "docs" / "board.md").read_text()
     found = re.findall(r"^\| `(\w+_front)`, (.*?) \|(.*)\|$", page, re.MULTILINE)

@@ -154,6 +154,9 @@ static void check_generics(void)
 #if FLUXPROOF_RESIDUAL
         {"RESIDUAL", AT(residual), 1},
 #endif
+#if FLUXPROOF_MODES
+        {"MODES", AT(modes), 1},
+#endif
 #ifdef FLUXPROOF_ENCODER /* the drive file has front ends: the core must be a fluxproof_board with them */
         {"ENCODER", AT(encoder), FLUXPROOF_ENCODER},
         {"CURRENTS", AT(currents), FLUXPROOF_CURRENTS},

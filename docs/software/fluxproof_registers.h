@@ -63,6 +63,11 @@ extern "C" {
 #define FLUXPROOF__RESIDUAL__VALUE_bp 0
 #define FLUXPROOF__RESIDUAL__VALUE_bw 32
 
+// reg - fluxproof::modes
+#define FLUXPROOF__MODES__VALUE_bm 0xffffffff
+#define FLUXPROOF__MODES__VALUE_bp 0
+#define FLUXPROOF__MODES__VALUE_bw 32
+
 // reg - fluxproof::enable
 #define FLUXPROOF__ENABLE__VALUE_bm 0x1
 #define FLUXPROOF__ENABLE__VALUE_bp 0
@@ -974,6 +979,36 @@ extern "C" {
 #define FLUXPROOF__COULOMB__VALUE_bp 0
 #define FLUXPROOF__COULOMB__VALUE_bw 32
 #define FLUXPROOF__COULOMB__VALUE_reset 0x0
+
+// reg - fluxproof::voltage_mode
+#define FLUXPROOF__VOLTAGE_MODE__VALUE_bm 0x1
+#define FLUXPROOF__VOLTAGE_MODE__VALUE_bp 0
+#define FLUXPROOF__VOLTAGE_MODE__VALUE_bw 1
+#define FLUXPROOF__VOLTAGE_MODE__VALUE_reset 0x0
+
+// reg - fluxproof::u_d_ext
+#define FLUXPROOF__U_D_EXT__VALUE_bm 0xffffffff
+#define FLUXPROOF__U_D_EXT__VALUE_bp 0
+#define FLUXPROOF__U_D_EXT__VALUE_bw 32
+#define FLUXPROOF__U_D_EXT__VALUE_reset 0x0
+
+// reg - fluxproof::u_q_ext
+#define FLUXPROOF__U_Q_EXT__VALUE_bm 0xffffffff
+#define FLUXPROOF__U_Q_EXT__VALUE_bp 0
+#define FLUXPROOF__U_Q_EXT__VALUE_bw 32
+#define FLUXPROOF__U_Q_EXT__VALUE_reset 0x0
+
+// reg - fluxproof::u_step
+#define FLUXPROOF__U_STEP__VALUE_bm 0xffffffff
+#define FLUXPROOF__U_STEP__VALUE_bp 0
+#define FLUXPROOF__U_STEP__VALUE_bw 32
+#define FLUXPROOF__U_STEP__VALUE_reset 0x0
+
+// reg - fluxproof::i_step
+#define FLUXPROOF__I_STEP__VALUE_bm 0xffffffff
+#define FLUXPROOF__I_STEP__VALUE_bp 0
+#define FLUXPROOF__I_STEP__VALUE_bw 32
+#define FLUXPROOF__I_STEP__VALUE_reset 0x0
 
 // reg - fluxproof::shaft_position
 #define FLUXPROOF__SHAFT_POSITION__VALUE_bm 0xffffffff
@@ -1922,7 +1957,8 @@ typedef struct {
     uint32_t references;
     uint32_t position_loop;
     uint32_t residual;
-    uint8_t RESERVED_28_3f[0x18];
+    uint32_t modes;
+    uint8_t RESERVED_2c_3f[0x14];
     uint32_t enable;
     uint32_t clear_trip;
     uint32_t clear_faults;
@@ -2078,7 +2114,12 @@ typedef struct {
     uint32_t k_inertia;
     uint32_t k_viscous;
     uint32_t coulomb;
-    uint8_t RESERVED_2bc_2df[0x24];
+    uint32_t voltage_mode;
+    uint32_t u_d_ext;
+    uint32_t u_q_ext;
+    uint32_t u_step;
+    uint32_t i_step;
+    uint8_t RESERVED_2d0_2df[0x10];
     uint32_t shaft_position;
     uint32_t position_error;
     uint8_t RESERVED_2e8_33f[0x58];

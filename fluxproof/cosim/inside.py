@@ -14,7 +14,7 @@ DRIVER = {
 }
 
 
-LEFT_OUT = ("position_regulator", "residual")  # instances that the default generics leave out
+LEFT_OUT = ("position_regulator", "residual", "modes", "beginnings")  # instances that the default generics leave out
 
 
 def instance(core, label: str):

@@ -8,7 +8,9 @@
 
 The limit i_q_max is what current_limit leaves beside i_d, in both modes.
 Torque mode (``speed_mode`` = 0): i_q_ref is ``i_q_ext``, limited, and the integral follows it, so that
-a change to speed mode is bumpless.  ``regen_limited``: in the last sample the bus voltage limited the braking
+a change to speed mode with no speed error is bumpless.  ``take_over``, the first sample of speed or position control:
+the output is i_q_ext once more, and the integral is what makes it so beside the proportional part, within its limit.
+``regen_limited``: in the last sample the bus voltage limited the braking
 current, see regeneration_limit.  ``run`` = 0: output and integral are zero.  torque_ff, of a trajectory, acts in
 speed mode within the same limit; it is zero without one.
 
@@ -35,11 +37,14 @@ class State(NamedTuple):
 
 
 @kernel
-def step(state, omega_ref, omega_me, i_q_ext, i_q_max, regen_limited, speed_mode, run, torque_ff, speed_kp, speed_ki):
+def step(
+    state, omega_ref, omega_me, i_q_ext, i_q_max, regen_limited, speed_mode, take_over, run, torque_ff, speed_kp,
+    speed_ki,
+):  # fmt: skip
     err = saturate(omega_ref - omega_me, PU_W)
     proportional = round_half_up(speed_kp * err, DROP_P) + (torque_ff << PU_TO_INTEGRAL)
     moved = state.integral + round_half_up(speed_ki * err, DROP_I)
-    asked = round_half_up(proportional + state.integral, PU_TO_INTEGRAL) if speed_mode else i_q_ext
+    asked = round_half_up(proportional + state.integral, PU_TO_INTEGRAL) if speed_mode and not take_over else i_q_ext
     i_q_ref = clamp(asked, -i_q_max, i_q_max)
     limited = 1 if asked != i_q_ref else 0
     brakes = (err > 0 and omega_me < 0) or (err < 0 and omega_me >= 0)
@@ -48,6 +53,8 @@ def step(state, omega_ref, omega_me, i_q_ext, i_q_max, regen_limited, speed_mode
     integral = i_q_ref << PU_TO_INTEGRAL
     if speed_mode:
         integral = state.integral if held else clamp(moved, -limit, limit)
+    if take_over:
+        integral = clamp((i_q_ext << PU_TO_INTEGRAL) - proportional, -limit, limit)
     if not run:
         integral, i_q_ref, limited = 0, 0, 0
     return State(integral), (i_q_ref, limited)
@@ -57,7 +64,8 @@ def reference(v, state):
     if not v["run"]:
         return {"i_q_ref": 0.0}
     err = PU.limit(v["omega_ref"] - v["omega_me"])
-    asked = v["speed_kp"] * err + v["torque_ff"] + state.integral * INTEGRAL.lsb if v["speed_mode"] else v["i_q_ext"]
+    regulated = v["speed_mode"] and not v["take_over"]
+    asked = v["speed_kp"] * err + v["torque_ff"] + state.integral * INTEGRAL.lsb if regulated else v["i_q_ext"]
     return {"i_q_ref": min(max(asked, -v["i_q_max"]), v["i_q_max"])}
 
 
@@ -96,6 +104,12 @@ def stimuli(rng, _config):
         for err in (0, 1, -1, 4000, -4000, PU.hi, PU.lo):
             row = {**regs, "speed_mode": 1, "omega_me": 0, "omega_ref": err, "torque_ff": torque_ff}
             rows += [row, {**row, "speed_mode": 0}, {**row, "speed_kp": KP.hi}, {**row, "i_q_max": PU.hi}]
+    for most in (PU.hi, 40000, 0):  # taken over with every sign of what is there and of the error, then regulated
+        for i_q_ext in (0, 30000, -30000, most, -most):
+            for err in (0, 1, -1, 900, -900, PU.hi, PU.lo):
+                row = {**regs, "speed_mode": 1, "omega_me": 0, "omega_ref": err, "i_q_ext": i_q_ext, "i_q_max": most}
+                row |= {"speed_kp": 20 << 16, "torque_ff": 333 * (most > 40000)}
+                rows += [{**row, "take_over": 1}, {**row, "speed_ki": 0}, row]
     ends = [(PU.lo, PU.hi, PU.hi), (PU.hi, PU.lo, PU.hi)]  # the error at its own ends, shown by gains up to one
     ends += [(end + off, 0, 999) for off in range(-4, 5) for end in (999, -999)]  # the output at its limit
     for omega_ref, omega_me, i_q_max in ends:
@@ -134,6 +148,7 @@ BLOCK = Block(
         Port("i_q_max", PU, lo=0, doc="limit of the q axis, see current_limit"),
         Port("regen_limited", BIT, doc="1: the bus voltage limited the braking current of the last sample"),
         Port("speed_mode", BIT, doc="1: speed control, 0: torque control"),
+        Port("take_over", BIT, doc="1: first sample of speed or position control, see mode_change"),
         Port("run", BIT, doc="0: output and integral zero"),
         Port("torque_ff", PU, doc="added in speed mode: torque or current of a trajectory's acceleration"),
     ),

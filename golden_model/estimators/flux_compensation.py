@@ -8,7 +8,8 @@
 All values are limited to +-delta_max.  While delta_lambda is held the integral decays, slowly enough to survive the
 few samples of a current step at the voltage limit.  In a longer limitation the merged models give the estimate; at the
 speeds where that happens they follow the voltage model.  While the gates are off the integral keeps its value, which a
-restart on the fly needs.  Leaving mode 3 clears it.
+restart on the fly needs.  Leaving mode 3 clears it.  ``resumes``, the first sample after voltage mode: the integral is
+what gives lambda_pi of the sample before once more, limited.
 
 Formats: flux_kp U(7,10), flux_ki U(0,17); products rounded half up to S(1,30), where 2**-17 per unit times the
 smallest useful flux_ki still moves the integral; the sum is limited, then rounded half up to FLUX, which cannot exceed
@@ -39,7 +40,7 @@ class State(NamedTuple):
 
 
 @kernel
-def axis(integral, delta, held, mode, kp, ki, limit):
+def axis(integral, delta, before, held, resumes, mode, kp, ki, limit):
     """One axis: (integral, lambda_pi, lambda_add, 1 if it was limited).
 
     The earlier scheme has a gain of one and no integral.
@@ -48,7 +49,8 @@ def axis(integral, delta, held, mode, kp, ki, limit):
     if mode == PROPOSED:
         proportional = round_half_up(delta * kp, DROP_P)
         increment = round_half_up(-integral, FORGET) if held else round_half_up(delta * ki, DROP_I)
-        moved = clamp(integral + increment, -limit, limit)
+        sum_ = (before << FLUX_TO_STATE) - proportional if resumes else integral + increment
+        moved = clamp(sum_, -limit, limit)
     total = proportional + moved
     result = round_half_up(clamp(total, -limit, limit), FLUX_TO_STATE)
     limited = 1 if abs(total) > limit else 0
@@ -60,13 +62,16 @@ def axis(integral, delta, held, mode, kp, ki, limit):
 
 
 @kernel
-def step(state, delta_lambda_d, delta_lambda_q, delta_held, flux_mode, flux_kp, flux_ki, delta_max):
+def step(
+    state, delta_lambda_d, delta_lambda_q, delta_held, before_d, before_q, resumes, flux_mode, flux_kp, flux_ki,
+    delta_max,
+):  # fmt: skip
     limit = delta_max << SHIFT_LIMIT
     integral_d, lambda_pi_d, lambda_add_d, limited_d = axis(
-        state.integral_d, delta_lambda_d, delta_held, flux_mode, flux_kp, flux_ki, limit
+        state.integral_d, delta_lambda_d, before_d, delta_held, resumes, flux_mode, flux_kp, flux_ki, limit
     )
     integral_q, lambda_pi_q, lambda_add_q, limited_q = axis(
-        state.integral_q, delta_lambda_q, delta_held, flux_mode, flux_kp, flux_ki, limit
+        state.integral_q, delta_lambda_q, before_q, delta_held, resumes, flux_mode, flux_kp, flux_ki, limit
     )
     outputs = (lambda_pi_d, lambda_pi_q, lambda_add_d, lambda_add_q, limited_d | limited_q)
     return State(integral_d, integral_q), outputs
@@ -78,6 +83,8 @@ def reference(v, state):
         delta = v[f"delta_lambda_{x}"]
         integral = old * FLUX_STATE.lsb
         integral += -integral * 2.0**-FORGET if v["delta_held"] else v["flux_ki"] * delta
+        if v["resumes"]:
+            integral = v[f"before_{x}"] - v["flux_kp"] * delta
         total = v["flux_kp"] * delta + min(max(integral, -limit), limit)
         proposed, earlier = v["flux_mode"] == PROPOSED, v["flux_mode"] == EARLIER
         out[f"lambda_pi_{x}"] = min(max(total, -limit), limit) if proposed else 0.0
@@ -107,6 +114,11 @@ def stimuli(rng, _config):
             rows.append({**base, "delta_max": 0})  # clears the integrals
             rows.append({**base, **sums, "flux_kp": 1 << DROP_P, "flux_ki": 0})
             rows.append({**base, **sums, "flux_kp": 0, "flux_ki": 1 << DROP_I})
+    for before in (0, 1 << 18, -(1 << 18), FLUX.hi, FLUX.lo):  # resumed within the limit, at it, beyond it; then moved
+        for delta in (0, 99, -77777, FLUX.hi, FLUX.lo):
+            row = {**base, "delta_max": 4096, "before_d": before, "before_q": -1 - before}
+            row |= {"delta_lambda_d": delta, "delta_lambda_q": -1 - delta}
+            rows += [{**row, "resumes": 1}, row]
     for k in range(12):  # between the limits, where every bit of the integrals counts
         gains = {"flux_kp": int(rng.integers(3000)), "flux_ki": int(rng.integers(1, 1 << (k + 4))), "delta_max": 65535}
         for _ in range(24):
@@ -120,7 +132,12 @@ BLOCK = Block(
     folder="estimators",
     paper="001, eq. (17): (K_p + K_i/s)*delta_lambda; the last term of eq. (16)",
     step=step,
-    inputs=DELTA,
+    inputs=(
+        *DELTA,
+        Port("before_d", FLUX, doc="compensation of the sample before, d axis"),
+        Port("before_q", FLUX, doc="compensation of the sample before, q axis"),
+        Port("resumes", BIT, doc="1: first sample after voltage mode"),
+    ),
     registers=(
         FLUX_MODE,
         Port("flux_kp", FLUX_KP, doc="proportional gain of the compensation"),

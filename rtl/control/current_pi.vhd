@@ -3,6 +3,8 @@
 --   err = i_ref - i;  u_pi = kp*err + int
 --   int += ki*err unless the voltage was at its limit and err pushes further
 -- sat_d, sat_q (-1, 0, +1): the limits that were active in the previous sample.  run = 0: all zero.
+-- follows = 1: int = u_rest - kp*err, so u_pi = u_rest, what the voltage of the last sample leaves;  by_voltage = 1: the
+-- voltage is the host's, no proportional part.
 -- One pipeline for both axes: d, then q a clock later.
 -- Formats: err PU, proportional part 28 fraction bits, integral S(1,28), output PU.
 -- Latency: 6 (d, then q: i_q and i_q_ref are needed a clock after i_d, u_pi_d is valid with out_soon).
@@ -17,26 +19,30 @@ use work.fluxproof_pkg.all;
 
 entity current_pi is
   port (
-    clk       : in  std_logic;
-    rst       : in  std_logic;
-    in_valid  : in  std_logic;
-    i_d       : in  signed(PU_W - 1 downto 0);
-    i_q       : in  signed(PU_W - 1 downto 0);
-    i_d_ref   : in  signed(PU_W - 1 downto 0);
-    i_q_ref   : in  signed(PU_W - 1 downto 0);
-    sat_d     : in  signed(1 downto 0);
-    sat_q     : in  signed(1 downto 0);
-    run       : in  std_logic;
-    kp_d      : in  unsigned(KP_W - 1 downto 0);
-    ki_d      : in  unsigned(KI_W - 1 downto 0);
-    kp_q      : in  unsigned(KP_W - 1 downto 0);
-    ki_q      : in  unsigned(KI_W - 1 downto 0);
-    out_soon  : out std_logic;
-    out_valid : out std_logic;
-    u_pi_d    : out signed(PU_W - 1 downto 0);
-    u_pi_q    : out signed(PU_W - 1 downto 0);
-    u_int_d   : out signed(INTEGRAL_W - 1 downto 0);
-    u_int_q   : out signed(INTEGRAL_W - 1 downto 0)
+    clk        : in  std_logic;
+    rst        : in  std_logic;
+    in_valid   : in  std_logic;
+    i_d        : in  signed(PU_W - 1 downto 0);
+    i_q        : in  signed(PU_W - 1 downto 0);
+    i_d_ref    : in  signed(PU_W - 1 downto 0);
+    i_q_ref    : in  signed(PU_W - 1 downto 0);
+    sat_d      : in  signed(1 downto 0);
+    sat_q      : in  signed(1 downto 0);
+    u_rest_d   : in  signed(PU_W - 1 downto 0);
+    u_rest_q   : in  signed(PU_W - 1 downto 0);
+    follows    : in  std_logic;
+    by_voltage : in  std_logic;
+    run        : in  std_logic;
+    kp_d       : in  unsigned(KP_W - 1 downto 0);
+    ki_d       : in  unsigned(KI_W - 1 downto 0);
+    kp_q       : in  unsigned(KP_W - 1 downto 0);
+    ki_q       : in  unsigned(KI_W - 1 downto 0);
+    out_soon   : out std_logic;
+    out_valid  : out std_logic;
+    u_pi_d     : out signed(PU_W - 1 downto 0);
+    u_pi_q     : out signed(PU_W - 1 downto 0);
+    u_int_d    : out signed(INTEGRAL_W - 1 downto 0);
+    u_int_q    : out signed(INTEGRAL_W - 1 downto 0)
   );
 end entity current_pi;
 
@@ -64,6 +70,7 @@ architecture rtl of current_pi is
   signal held_1         : std_logic;
   signal held_2         : std_logic;
   signal held_3         : std_logic;
+  signal u_rest_3       : signed(PU_W - 1 downto 0);
   signal proportional_3 : signed(PROP_W - 1 downto 0);
   signal moved_3        : signed(INTEGRAL_W - 1 downto 0);
   signal proportional_4 : signed(PROP_W - 1 downto 0);
@@ -80,6 +87,8 @@ begin
   integral_0 <= state.integral_q when valid(1) = '1' else state.integral_d;
   err_0      <= saturate(resize(i_ref_0, PU_W + 1) - i_0, PU_W);
 
+  u_rest_3   <= u_rest_q when valid(4) = '1' else u_rest_d;
+
   -- Stages 1 to 3: proportional = kp*err;  moved = integral + ki*err
   proportional_part : entity work.multiply_add
     generic map (DROP => CURRENT_PI_DROP_P)
@@ -90,7 +99,8 @@ begin
     port map (clk => clk, a => ki_0, b => err_0, c => integral_0, y => moved_3, limited => open);
 
   process (clk)
-    variable u_pi : signed(PU_W - 1 downto 0);
+    variable u_pi         : signed(PU_W - 1 downto 0);
+    variable proportional : signed(PROP_W - 1 downto 0);
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
@@ -100,11 +110,15 @@ begin
       held_2 <= held_1;
       held_3 <= held_2;
 
-      -- Stage 4: integral = moved unless held;  all zero while not running
-      proportional_4 <= proportional_3;
+      -- Stage 4: integral = moved unless held, or u_rest - proportional;  all zero while not running
+      proportional := proportional_3 and not by_voltage;
+      proportional_4 <= proportional;
       integral_4     <= moved_3;
       if held_3 = '1' then
         integral_4 <= state.integral_q when valid(4) = '1' else state.integral_d;
+      end if;
+      if follows = '1' then
+        integral_4 <= saturate(shift_left(resize(u_rest_3, PROP_W + 1), PU_TO_INTEGRAL) - proportional, INTEGRAL_W);
       end if;
       if run = '0' then
         proportional_4 <= (others => '0');

@@ -5,6 +5,8 @@
 --   integral += speed_ki*err unless u is beyond the limit and err pushes further, or the bus voltage limited the braking
 --   current of the last sample (regen_limited) and err brakes
 -- Torque mode (speed_mode = 0): i_q_ref is i_q_ext, limited, and the integral follows it.
+-- take_over = 1, the first sample of speed or position control: i_q_ref is i_q_ext once more, and the integral is what
+-- makes it so beside the proportional part, within +-i_q_max.
 -- run = 0: output and integral are zero.  torque_ff, of a trajectory, acts in speed mode; zero without one.
 -- Formats: err PU, proportional part with torque_ff 28 fraction bits, integral S(1,28), output PU.
 -- Latency: 5.  Interval: 5.
@@ -27,6 +29,7 @@ entity speed_pi is
     i_q_max       : in  signed(PU_W - 1 downto 0);
     regen_limited : in  std_logic;
     speed_mode    : in  std_logic;
+    take_over     : in  std_logic;
     run           : in  std_logic;
     torque_ff     : in  signed(PU_W - 1 downto 0);
     speed_kp      : in  unsigned(KP_W - 1 downto 0);
@@ -41,6 +44,7 @@ architecture rtl of speed_pi is
   constant LATENCY : positive := SPEED_PI_LATENCY;
   constant PROP_W  : positive := SPEED_PI_PROPORTIONAL_W;
   constant TOTAL_W : positive := PROP_W + 2 - PU_TO_INTEGRAL;
+  constant LOAD_W  : positive := PROP_W + 1;
 
   type state_t is record
     integral : signed(INTEGRAL_W - 1 downto 0);
@@ -58,6 +62,7 @@ architecture rtl of speed_pi is
   signal proportional_3 : signed(PROP_W - 1 downto 0);
   signal moved_3        : signed(INTEGRAL_W downto 0);
   signal asked_4        : signed(TOTAL_W - 1 downto 0);
+  signal load_4         : signed(LOAD_W - 1 downto 0);
 begin
   valid(0) <= in_valid;
   by_kp    <= signed('0' & speed_kp);
@@ -88,13 +93,14 @@ begin
       rises <= '1' when err_0 > 0 else '0';
       falls <= '1' when err_0 < 0 else '0';
 
-      -- Stage 4: asked = proportional + integral, or i_q_ext in torque mode
+      -- Stage 4: asked = proportional + integral, or i_q_ext in torque mode and at its end;  load = i_q_ext - proportional
       asked_4 <= round_half_up(resize(proportional_3, PROP_W + 1) + state.integral, PU_TO_INTEGRAL);
-      if speed_mode = '0' then
+      load_4  <= shift_left(resize(i_q_ext, LOAD_W), PU_TO_INTEGRAL) - proportional_3;
+      if speed_mode = '0' or take_over = '1' then
         asked_4 <= resize(i_q_ext, TOTAL_W);
       end if;
 
-      -- Stage 5: i_q_ref = asked, limited;  integral = moved, limited, unless held, or i_q_ref in torque mode
+      -- Stage 5: i_q_ref = asked, limited;  integral = moved, limited, unless held, or i_q_ref in torque mode, or load
       wanted := resize(within(asked_4, unsigned(i_q_max), 0), PU_W);
       past   := beyond(asked_4, unsigned(i_q_max), 0);
       brakes := (rises and omega_me(PU_W - 1)) or (falls and not omega_me(PU_W - 1));
@@ -103,7 +109,9 @@ begin
       if valid(LATENCY - 1) = '1' then
         i_q_ref       <= wanted;
         speed_limited <= past;
-        if speed_mode = '0' then
+        if take_over = '1' then
+          state.integral <= resize(within(load_4, unsigned(i_q_max), PU_TO_INTEGRAL), INTEGRAL_W);
+        elsif speed_mode = '0' then
           state.integral <= shift_left(resize(wanted, INTEGRAL_W), PU_TO_INTEGRAL);
         elsif held = '0' then
           state.integral <= resize(within(moved_3, unsigned(i_q_max), PU_TO_INTEGRAL), INTEGRAL_W);

@@ -4,6 +4,7 @@
 --   integral = integral - integral/2**8 while delta_lambda is held: an unverified compensation decays
 --   lambda_pi = limit(flux_kp*delta_lambda + integral)                                    flux_mode 3
 --   lambda_add = limit(delta_lambda)                                                      flux_mode 2
+-- resumes = 1, the first sample after voltage mode: the integral is what gives lambda_pi of the sample before once more.
 -- limit: to +-delta_max, reported.
 -- One pipeline for both axes: d, then q a clock later.
 -- Formats: flux_kp U(7,10), flux_ki U(0,17), products and integral S(1,30), delta_max U(0,16), out FLUX.
@@ -24,6 +25,9 @@ entity flux_compensation is
     delta_lambda_d       : in  signed(FLUX_W - 1 downto 0);
     delta_lambda_q       : in  signed(FLUX_W - 1 downto 0);
     delta_held           : in  std_logic;
+    before_d             : in  signed(FLUX_W - 1 downto 0);
+    before_q             : in  signed(FLUX_W - 1 downto 0);
+    resumes              : in  std_logic;
     flux_mode            : in  unsigned(1 downto 0);
     flux_kp              : in  unsigned(16 downto 0);
     flux_ki              : in  unsigned(16 downto 0);
@@ -44,7 +48,7 @@ architecture rtl of flux_compensation is
   constant EARLIER     : natural  := FLUX_MODELS_EARLIER;
   constant PROPOSED    : natural  := FLUX_MODELS_PROPOSED;
   constant PART_W      : positive := FLUX_STATE_W + 7;  -- flux_kp is below 128
-  constant MOVED_W     : positive := FLUX_STATE_W + 1;
+  constant MOVED_W     : positive := FLUX_STATE_W + 8;  -- so wide for what resumes
   constant TOTAL_W     : positive := PART_W + 1;
 
   constant NOTHING : signed(0 downto 0) := "0";
@@ -64,6 +68,7 @@ architecture rtl of flux_compensation is
   signal increment_4    : signed(FLUX_STATE_W + 1 downto 0);
   signal integral_4     : signed(FLUX_STATE_W - 1 downto 0);
   signal delta_4        : signed(FLUX_W - 1 downto 0);
+  signal before_4       : signed(FLUX_W - 1 downto 0);
   signal moved_5        : signed(MOVED_W - 1 downto 0);
   signal proportional_5 : signed(PART_W - 1 downto 0);
   signal integral_6     : signed(FLUX_STATE_W - 1 downto 0);
@@ -91,6 +96,7 @@ begin
 
   integral_4 <= state.integral_q when valid(5) = '1' else state.integral_d;
   delta_4    <= delta_lambda_q when valid(5) = '1' else delta_lambda_d;
+  before_4   <= before_q when valid(5) = '1' else before_d;
 
   -- lambda = total, limited; the limit is a multiple of FLUX's LSB, so the rounding cannot move a value beyond it
   lambda_7 <= resize(round_half_up(within(total_7, delta_max, SHIFT_LIMIT), FLUX_TO_STATE), FLUX_W);
@@ -112,6 +118,9 @@ begin
         increment := resize(round_half_up(-resize(integral_4, MOVED_W), FORGET), FLUX_STATE_W);
       end if;
       moved_5        <= resize(integral_4, MOVED_W) + increment;
+      if resumes = '1' then
+        moved_5 <= shift_left(resize(before_4, MOVED_W), FLUX_TO_STATE) - resize(proportional_4, PART_W);
+      end if;
       proportional_5 <= resize(proportional_4, PART_W);
       if flux_mode = EARLIER then
         proportional_5 <= shift_left(resize(delta_4, PART_W), FLUX_TO_STATE);

@@ -88,6 +88,7 @@ package fluxproof_pkg is
     k_u_max          : unsigned(RECIPROCAL_W - 1 downto 0);  -- radius of the voltage circle / bus voltage
     k_delay          : unsigned(RECIPROCAL_W - 1 downto 0);  -- angle of the delay in turns, per unit of speed
     i_max            : signed(PU_W - 1 downto 0);  -- limit of the current: radius of the circle of i_d and i_q references
+    voltage_mode     : std_logic;  -- 1: the voltage of u_d_ext and u_q_ext in place of torque control
     use_table        : std_logic;  -- 1: current references from the torque table; i_q_ext is then a torque
     position_mode    : std_logic;  -- 1: position control, over speed control
     position_kp      : unsigned(KP_W - 1 downto 0);  -- speed per turn of position error
@@ -126,6 +127,10 @@ package fluxproof_pkg is
     l_q              : unsigned(INDUCTANCE_W - 1 downto 0);  -- inductance, q axis
     lambda_mg        : signed(PU_W - 1 downto 0);  -- magnet flux linkage
     k_chord          : unsigned(16 downto 0);  -- (sample time)**2 / 24, per unit
+    u_d_ext          : signed(PU_W - 1 downto 0);  -- voltage of voltage mode, d axis
+    u_q_ext          : signed(PU_W - 1 downto 0);  -- voltage of voltage mode, q axis
+    u_step           : signed(PU_W - 1 downto 0);  -- largest change of a voltage of voltage mode per sample
+    i_step           : signed(PU_W - 1 downto 0);  -- largest change of a current reference per sample after a change of modes
     min_pulse        : unsigned(11 downto 0);  -- shortest pulse of a leg, clocks
     double_update    : std_logic;  -- 1: sample and update at the peak too; taken while the gates are off
     omega_0          : unsigned(15 downto 0);  -- crossover of the two models, times the sample time
@@ -445,6 +450,17 @@ package fluxproof_pkg is
   constant FLUX_LIMIT_REACH_BITS : natural := 17;
   constant FLUX_LIMIT_DROP_REACH : natural := 17;
   constant FLUX_LIMIT_DIVIDEND_W : natural := 24;
+
+  -- mode_change: none: docs/modes.md
+  constant MODE_CHANGE_LATENCY : positive := 1;
+  constant MODE_CHANGE_MODE_W : natural := 2;
+  constant MODE_CHANGE_TORQUE : natural := 0;
+  constant MODE_CHANGE_VOLTAGE : natural := 1;
+  constant MODE_CHANGE_SPEED : natural := 2;
+  constant MODE_CHANGE_POSITION : natural := 3;
+
+  -- mode_references: none: docs/modes.md
+  constant MODE_REFERENCES_LATENCY : positive := 6;
 
   -- position_control: none: docs/position.md
   constant POSITION_CONTROL_LATENCY : positive := 7;

@@ -28,7 +28,8 @@ entity register_file is
     ESTIMATORS    : natural := 1;
     REFERENCES    : natural := 0;
     POSITION_LOOP : natural := 0;
-    RESIDUAL      : natural := 0
+    RESIDUAL      : natural := 0;
+    MODES         : natural := 0
   );
   port (
     clk               : in  std_logic;
@@ -709,6 +710,26 @@ begin
         settings.coulomb <= signed(held(17 downto 0));
         written(174)     <= '1';
       end if;
+      if MODES = 1 and (row(21) and column(7) and not sample_busy) = '1' then
+        settings.voltage_mode <= held(0);
+        written(175)          <= '1';
+      end if;
+      if MODES = 1 and (row(22) and column(0) and not sample_busy) = '1' then
+        settings.u_d_ext <= signed(held(17 downto 0));
+        written(176)     <= '1';
+      end if;
+      if MODES = 1 and (row(22) and column(1) and not sample_busy) = '1' then
+        settings.u_q_ext <= signed(held(17 downto 0));
+        written(177)     <= '1';
+      end if;
+      if MODES = 1 and (row(22) and column(2) and not sample_busy) = '1' then
+        settings.u_step <= signed(held(17 downto 0));
+        written(178)    <= '1';
+      end if;
+      if MODES = 1 and (row(22) and column(3) and not sample_busy) = '1' then
+        settings.i_step <= signed(held(17 downto 0));
+        written(179)    <= '1';
+      end if;
       if RESIDUAL = 1 and (row(26) and column(0) and not sample_busy) = '1' then
         settings.residual_min <= unsigned(held(16 downto 0));
         written(208)          <= '1';
@@ -900,6 +921,11 @@ begin
         settings.k_inertia        <= (others => '0');
         settings.k_viscous        <= (others => '0');
         settings.coulomb          <= (others => '0');
+        settings.voltage_mode     <= '0';
+        settings.u_d_ext          <= (others => '0');
+        settings.u_q_ext          <= (others => '0');
+        settings.u_step           <= (others => '0');
+        settings.i_step           <= (others => '0');
         settings.residual_min     <= (others => '0');
         settings.residual_w       <= (others => '0');
         settings.residual_i       <= (others => '0');
@@ -1063,7 +1089,8 @@ begin
   shown(7)          <= std_logic_vector(to_unsigned(REFERENCES, 32));
   shown(8)          <= std_logic_vector(to_unsigned(POSITION_LOOP, 32));
   shown(9)          <= std_logic_vector(to_unsigned(RESIDUAL, 32));
-  shown(10 to 16)   <= (others => (others => '0'));
+  shown(10)         <= std_logic_vector(to_unsigned(MODES, 32));
+  shown(11 to 16)   <= (others => (others => '0'));
   shown(17)         <= "0000000000000000000000000000000" & clear_trip;
   shown(18)         <= "0000000000000000000000000000000" & clear_faults_in;
   shown(19 to 26)   <= (others => (others => '0'));

@@ -23,6 +23,7 @@ GENERICS = {
     "REFERENCES": 0,
     "POSITION_LOOP": 0,
     "RESIDUAL": 0,
+    "MODES": 0,
 }  # as in the core
 BOARD_GENERICS = {"ENCODER": 1, "CURRENTS": 1, "SPI_LINES": 4}
 BETWEEN, AT_ONCE = ("setting", "sample pulse"), ("command", "pulse")

@@ -49,6 +49,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "table_current",
         "position_regulator",
         "trajectory",
+        "modes",
+        "beginnings",
         "speed_regulator",
         "regeneration",
         "current_regulators",

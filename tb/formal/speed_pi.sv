@@ -12,7 +12,9 @@ module formal_top (
     input signed [17:0] i_q_max,
     input               regen_limited,
     input               speed_mode,
+    input               take_over,
     input               run,
+    input signed [17:0] torque_ff,
     input        [23:0] speed_kp,
     input        [23:0] speed_ki
 );
@@ -29,7 +31,9 @@ module formal_top (
       .i_q_max(i_q_max),
       .regen_limited(regen_limited),
       .speed_mode(speed_mode),
+      .take_over(take_over),
       .run(run),
+      .torque_ff(torque_ff),
       .speed_kp(speed_kp),
       .speed_ki(speed_ki),
       .out_valid(out_valid),

@@ -19,7 +19,7 @@ static uint32_t generic(uint32_t offset)
 {
     const uint32_t list[] = {FLUXPROOF_ADC_BITS, FLUXPROOF_POSITION_BITS, FLUXPROOF_CARRIER_HALF,
                              FLUXPROOF_CLOCK_HZ, FLUXPROOF_ESTIMATORS, FLUXPROOF_REFERENCES,
-                             FLUXPROOF_POSITION_LOOP, FLUXPROOF_RESIDUAL};
+                             FLUXPROOF_POSITION_LOOP, FLUXPROOF_RESIDUAL, FLUXPROOF_MODES};
     if (offset == AT(encoder))
         return FLUXPROOF_ENCODER;
     if (offset == AT(currents))

@@ -27,6 +27,7 @@ GENERICS = {
     "references": 1,
     "position_loop": 0,
     "residual": 1,
+    "modes": 0,
 }
 MAP = registers()
 WRITABLE = [r for r in MAP.values() if r.kind.writable]

@@ -18,6 +18,7 @@ GENERICS = {
     "REFERENCES": 0,
     "POSITION_LOOP": 0,
     "RESIDUAL": 0,
+    "MODES": 0,
     "DEPTH_BITS": 9,
 }
 
@@ -50,7 +51,7 @@ begin
   core : entity work.fluxproof
     generic map (ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS, CARRIER_HALF => CARRIER_HALF,
                  ESTIMATORS => ESTIMATORS, REFERENCES => REFERENCES, POSITION_LOOP => POSITION_LOOP,
-                 RESIDUAL => RESIDUAL)
+                 RESIDUAL => RESIDUAL, MODES => MODES)
     port map ({", ".join(f"{name} => {name}" for name in core)});
   stream : entity work.telemetry
     generic map (ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS, DEPTH_BITS => DEPTH_BITS)

@@ -62,6 +62,10 @@ def replay(recording: Recording) -> tuple[Digital, list[str]]:
         return Digital(), [
             "The digital part was not checked: the recording does not hold the targets of position mode."
         ]
+    if meta["config"].get("modes", 0) and meta["registers"]["voltage_mode"]:
+        return Digital(), [
+            "The digital part was not checked: the recording does not hold the voltages of voltage mode."
+        ]
     observed = meta.get("observed") or _duties(recording, meta["config"])
     if not observed:
         return Digital(), [
