@@ -10,8 +10,7 @@ import numpy as np
 from cocotb_tests.support.host.rtl_board import RtlBoard
 from fluxproof.cosim.sleeping import with_sleep
 from fluxproof.hil.load import Word, load_words
-from fluxproof.plant import Inverter, Machine, Sensors
-from fluxproof.simulate.run import bus_of
+from fluxproof.plant import Bus, Inverter, Machine, Sensors
 from golden_model.formats import MOTOR_SPEED
 from golden_model.io import motor_map
 from golden_model.io.register_map import OKAY
@@ -21,18 +20,18 @@ PACKET = 200  # clocks from a trigger in which the packet of its sample ends
 
 
 class HilBoard(RtlBoard):
-    """``machine``, ``inverter``, ``sensors``: of the motor, on the bus of [supply], loaded at the start."""
+    """``machine``, ``inverter``, ``sensors``: of the motor, and its ``bus``, loaded at the start."""
 
     top = "fluxproof_hil"
     rewrite = staticmethod(with_sleep)
 
-    def __init__(self, drive, machine: Machine, inverter: Inverter, sensors: Sensors):
+    def __init__(self, drive, machine: Machine, inverter: Inverter, sensors: Sensors, bus: Bus):
         super().__init__(drive)
         self.map = motor_map.registers()
         self.stream: list[np.ndarray] = []  # words of the telemetry
         self.buses: list[int] = []  # voltage of the bus, a value a period
         self.core.tick = self.listen
-        self.load(load_words(drive, machine, inverter, sensors, bus_of(drive)))
+        self.load(load_words(drive, machine, inverter, sensors, bus))
         self.turn_rad_s = 2.0 * math.pi * drive.core.clock_hz / STEP * MOTOR_SPEED.lsb
 
     def load(self, words: list[Word]) -> None:
