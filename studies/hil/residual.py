@@ -39,6 +39,7 @@ SEGMENT = 20_000  # samples with the same motor
 SPEEDS, CHANGES = (-0.8, 0.8), 25  # of the rated speed; of speed and current in a segment
 SEED = 53
 SLIP_AT_S = 0.1  # of steady running before an encoder slips
+SLOWEST_S = 15e-6  # a time constant that the plant's step follows
 SHARES = (0.01, 0.02, 0.03, 0.05, 0.1)  # of a phase's turns
 
 
@@ -99,8 +100,9 @@ class Fault(NamedTuple):
 
 
 def shorted(machine: Machine, share: float) -> dict:
-    """Keys of the plant for a share of the turns of phase b, shorted."""
-    return {"shorted_share": share, "shorted_phase": 1, "shorted_leakage_h": share**2 * machine.inductance_d_h}
+    """Keys of the plant for a share of the turns of phase b, shorted; its time constant is SLOWEST_S at least."""
+    leakage = max(share**2 * machine.inductance_d_h, SLOWEST_S * share * machine.resistance_ohm)
+    return {"shorted_share": share, "shorted_phase": 1, "shorted_leakage_h": leakage}
 
 
 FAULTS = (
