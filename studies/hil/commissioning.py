@@ -97,8 +97,10 @@ class HilBus:
             return int(self._sample[-1]) + 2 * int(self._carry.tripped)
         if name == "encoder_flags":
             return 1  # an absolute code is referenced
+        if name == "snap_code":  # the encoder's own, also while a position is forced
+            return int(self._carry.codes[4])
         if name in CODES:
-            return int(self._sample[{"snap_code": 4, "snap_position": 4}.get(name, CODES.index(name) - 2)])
+            return int(self._sample[4 if name == "snap_position" else CODES.index(name) - 2])
         return self._values[name]
 
     def write(self, name: str, value: int) -> None:
