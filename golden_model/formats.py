@@ -31,6 +31,7 @@ LIMIT = Format(0, 1, 8)  # trip levels: currents and bus voltage in steps of a 2
 SAMPLE_TIME = Format(0, -1, 18)  # sample time times omega_base: below half a radian a sample at base speed
 MOTOR_VOLTAGE = Format(1, 1, 22)  # voltages of the motor in the FPGA, per unit of its own base: docs/hil.md
 MOTOR_LEG = Format(1, 6, 22)  # a leg's voltage, summed over the clocks of a step
+MOTOR_CHARGE = Format(1, 8, 16)  # currents of the legs, summed over the clocks of a step
 MOTOR_FLUX = Format(1, 1, 38)  # flux that is integrated: its LSB is that of a leg's voltage times a clock
 MOTOR_TRIG = Format(1, 0, 17)  # sine and cosine of the motor, below 1
 MOTOR_ANGLE = Format(0, 0, 25)  # angles of the motor in turns

@@ -11,12 +11,13 @@ import pytest
 
 from cocotb_tests.support.needs import skip_without_ghdl5
 from fluxproof.cosim import sleeping
-from fluxproof.hil.registers import PORTS, ROOM, code, machine_of, motor_registers, motor_scale
+from fluxproof.hil.registers import PORTS, ROOM, bus_registers, code, machine_of, motor_registers, motor_scale
+from fluxproof.plant.bus import Bus
 from fluxproof.plant.pmsm import Machine
 from golden_model.common.multiply_add import multiply_subtract
 from golden_model.fixed import round_half_up
 from golden_model.formats import FLUX, MOTOR_FLUX, MOTOR_LEG, MOTOR_VOLTAGE, PU
-from golden_model.motor import motor_flux, motor_legs, motor_model, motor_shaft
+from golden_model.motor import motor_bus, motor_flux, motor_legs, motor_model, motor_shaft
 from golden_model.motor.motor_model import Shown
 from studies.hil import closed_loop, equal, golden, residual
 from studies.hil.beside_plant import HELD, OWN, beside_plant, follow
@@ -66,7 +67,7 @@ def test_compiled_loop_is_the_clocked_one():
     clocked = closed_loop.golden_run(of, periods, 1 << 40).observed
     asked = np.array([[*closed_loop.references(of).values(), 0]] * periods, np.int64)
     u_dc = of.scale.u_dc(of.drive.inverter.dc_bus_v)
-    hil = golden.Hil(of.core.values, of.core.config, of.motor, of.tables, of.sensors, u_dc)
+    hil = golden.Hil(of.core.values, of.core.config, of.motor, of.tables, of.sensors, u_dc, of.bus)
     _, observed = golden.record(hil, asked, golden.constant(of.motor, periods))
     for k, row in enumerate(clocked):
         assert row == {name: int(values[k]) for name, values in observed.items()}, f"sample {k}"
@@ -122,6 +123,29 @@ def test_rounding_makes_no_energy():
         assert energy <= before + step, "a current grows without a voltage"
         before = energy
     assert max(abs(i_d), abs(i_q)) <= small and shorted(regs, 0, 10_000, state).of_flux == state.of_flux
+
+
+def test_the_bus_is_a_capacitor_with_its_source_and_its_brake_resistor():
+    """Against closed forms over a millisecond: charge taken, fed through a resistance, held by a rectifier, braked."""
+    scale = motor_scale(SERVO, U_DC_V, CURRENT_A, CLOCK_HZ)
+    farad, source_ohm, brake_ohm, steps = 470e-6, 2.0, 5.0, round(1e-3 / scale.step_s)
+    regs, time_s = bus_registers(scale, Bus(farad, source_ohm, True, brake_ohm)), steps * scale.step_s
+
+    def after(start_v, source_v, amperes=0.0, brake=0, **changes):
+        charge, now = round(amperes / scale.current_a * 2**16) * motor_model.STEP, regs._replace(**changes)
+        state = motor_bus.State(scale.u_dc(start_v) << motor_bus.DROP_U)
+        for _ in range(steps):
+            state, (u_dc,) = motor_bus.step(state, charge, scale.u_dc(source_v), brake, 0, *now)
+        return u_dc * MOTOR_VOLTAGE.lsb * scale.voltage_v
+
+    assert after(24.0, 0.0, 2.0) == pytest.approx(24.0 - 2.0 * time_s / farad, rel=1e-3)
+    fed = math.exp(-time_s / (source_ohm * farad))
+    assert after(20.0, 24.0) == pytest.approx(24.0 - 4.0 * fed, rel=1e-4)
+    assert after(28.0, 24.0) == pytest.approx(28.0, rel=1e-6), "a rectifier takes nothing back"
+    assert after(28.0, 24.0, rectifier=0) == pytest.approx(24.0 + 4.0 * fed, rel=1e-4)
+    assert after(28.0, 0.0, brake=1) == pytest.approx(28.0 * math.exp(-time_s / (brake_ohm * farad)), rel=1e-3)
+    assert after(28.0, 0.0, -2.0) == pytest.approx(28.0 + 2.0 * time_s / farad, rel=1e-3)
+    assert after(28.0, 21.0, 5.0, inv_c=0) == pytest.approx(21.0, rel=1e-6), "without a capacitor it is the source"
 
 
 def test_a_rounded_loss_is_a_loss():

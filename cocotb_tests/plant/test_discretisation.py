@@ -75,6 +75,7 @@ ABSENT = {
     "coefficient at reference": {"resistance_temp_coeff_per_k": 0.0039, "magnet_temp_coeff_per_k": -0.001},
     "harmonics of no amplitude": {"emf_harmonics": (Harmonic(6, 0.0, 0.0, 0.3), Harmonic(12))},
     "cogging of no amplitude": {"cogging_order": 24, "cogging_phase_rad": 0.5},
+    "a short without turns": {"shorted_phase": 1, "shorted_resistance_ohm": 0.1, "shorted_leakage_h": 1e-5},
     "explicit zeros": {
         "coulomb_friction_nm": 0.0,
         "saturation_d_per_a2": 0.0,

@@ -90,8 +90,8 @@ def raw(rows) -> bytes:
     return np.ascontiguousarray(rows, "<u4").tobytes()
 
 
-def watched(*pieces: bytes, capacity: int = 1000) -> Live:
-    live = Live(Pieces(*pieces), capacity, LiveReplay(SET))
+def watched(*pieces: bytes, capacity: int = 1000, registers=SET) -> Live:
+    live = Live(Pieces(*pieces), capacity, LiveReplay(registers))
     while live.source.pieces:
         live.pump()
     return live
@@ -136,6 +136,18 @@ def test_equal_gap_and_bit(words):
     live = watched(raw(wrong[:650]), raw(wrong[650:]))
     assert live.replay.difference.startswith("block park, sample 700, signal i_d, bit 2: ")
     assert live.replay.equal == 700 and live.total == 2500
+
+
+def test_a_stream_that_begins_late(words):
+    """Of a core that ran before, blocks without state are compared: a wrong bit and registers of another drive show."""
+    told = watched(raw(words[1:])).replay.told()
+    assert told.startswith("digital: 0 samples compared") and "of 2,499 samples only blocks without state" in told
+    wrong = words[1:].copy()
+    wrong[700, 11] ^= 4
+    assert watched(raw(wrong)).replay.told().startswith("digital: block park, sample 701, signal i_d, bit 2: ")
+    other = SET._replace(config=SET.config._replace(carrier_half=SET.config.carrier_half // 2))
+    live = watched(raw(words[1:1300]), raw(words[1300:]), registers=other)
+    assert "signal duty_a" in live.replay.told() or "signal compare_a" in live.replay.told()
 
 
 def test_command_on_a_file(words, tmp_path, capsys):

@@ -1792,6 +1792,30 @@ extern "C" {
 #define FLUXPROOF__MOTOR_COULOMB__VALUE_bw 23
 #define FLUXPROOF__MOTOR_COULOMB__VALUE_reset 0x0
 
+// reg - fluxproof::motor_inv_c
+#define FLUXPROOF__MOTOR_INV_C__VALUE_bm 0xffffff
+#define FLUXPROOF__MOTOR_INV_C__VALUE_bp 0
+#define FLUXPROOF__MOTOR_INV_C__VALUE_bw 24
+#define FLUXPROOF__MOTOR_INV_C__VALUE_reset 0x0
+
+// reg - fluxproof::motor_k_source
+#define FLUXPROOF__MOTOR_K_SOURCE__VALUE_bm 0xffffff
+#define FLUXPROOF__MOTOR_K_SOURCE__VALUE_bp 0
+#define FLUXPROOF__MOTOR_K_SOURCE__VALUE_bw 24
+#define FLUXPROOF__MOTOR_K_SOURCE__VALUE_reset 0x0
+
+// reg - fluxproof::motor_k_brake
+#define FLUXPROOF__MOTOR_K_BRAKE__VALUE_bm 0xffffff
+#define FLUXPROOF__MOTOR_K_BRAKE__VALUE_bp 0
+#define FLUXPROOF__MOTOR_K_BRAKE__VALUE_bw 24
+#define FLUXPROOF__MOTOR_K_BRAKE__VALUE_reset 0x0
+
+// reg - fluxproof::motor_rectifier
+#define FLUXPROOF__MOTOR_RECTIFIER__VALUE_bm 0x1
+#define FLUXPROOF__MOTOR_RECTIFIER__VALUE_bp 0
+#define FLUXPROOF__MOTOR_RECTIFIER__VALUE_bw 1
+#define FLUXPROOF__MOTOR_RECTIFIER__VALUE_reset 0x0
+
 // reg - fluxproof::motor_scale_a
 #define FLUXPROOF__MOTOR_SCALE_A__VALUE_bm 0xffffffff
 #define FLUXPROOF__MOTOR_SCALE_A__VALUE_bp 0
@@ -1944,6 +1968,11 @@ extern "C" {
 #define FLUXPROOF__MOTOR_READY__VALUE_bm 0x1
 #define FLUXPROOF__MOTOR_READY__VALUE_bp 0
 #define FLUXPROOF__MOTOR_READY__VALUE_bw 1
+
+// reg - fluxproof::motor_u_bus
+#define FLUXPROOF__MOTOR_U_BUS__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_U_BUS__VALUE_bp 0
+#define FLUXPROOF__MOTOR_U_BUS__VALUE_bw 32
 
 // addrmap - fluxproof
 typedef struct {
@@ -2265,7 +2294,12 @@ typedef struct {
     uint32_t motor_k_j;
     uint32_t motor_viscous;
     uint32_t motor_coulomb;
-    uint8_t RESERVED_85c_87f[0x24];
+    uint8_t RESERVED_85c_85f[0x4];
+    uint32_t motor_inv_c;
+    uint32_t motor_k_source;
+    uint32_t motor_k_brake;
+    uint32_t motor_rectifier;
+    uint8_t RESERVED_870_87f[0x10];
     uint32_t motor_scale_a;
     uint32_t motor_scale_b;
     uint32_t motor_scale_c;
@@ -2295,11 +2329,12 @@ typedef struct {
     uint32_t motor_theta_e;
     uint32_t motor_shoot_through;
     uint32_t motor_ready;
+    uint32_t motor_u_bus;
 } fluxproof_t;
 
 
 #if defined(__cplusplus) || __STDC_VERSION__ >= 201112L
-static_assert(sizeof(fluxproof_t) == 0x924, "Packing error");
+static_assert(sizeof(fluxproof_t) == 0x928, "Packing error");
 #endif
 
 #ifdef __cplusplus

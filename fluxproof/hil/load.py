@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What software writes into the motor of fluxproof_hil: the motor and the sensors of a drive file, as register words.
 
-words = load_words(drive, machine, inverter, sensors)     [(register, word), ...] in the order of writing
+words = load_words(drive, machine, inverter, sensors, bus)     [(register, word), ...] in the order of writing
 
 The rotor is held at the angle zero while they are written.  Of the tables only words that are not zero are written:
 block RAM is zero after configuration; ``erase_words()`` are those of a motor that had others before.
@@ -14,8 +14,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fluxproof.hil.registers import code, motor_registers, motor_scale, motor_tables
-from fluxproof.plant import Inverter, Machine, Sensors
+from fluxproof.hil.registers import bus_registers, code, motor_registers, motor_scale, motor_tables
+from fluxproof.plant import Bus, Inverter, Machine, Sensors
 from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError
 from golden_model.formats import MOTOR_ANGLE
@@ -27,14 +27,16 @@ HALF = 1 << motor_map.HALF_WORD.width
 BELL = math.sqrt(4 * (256**2 - 1) / 12)  # standard deviation of the sum of four bytes
 ENCODERS = ("code", "abz", "hall")  # that motor_bench has
 Word = tuple[str, int]
+IDEAL = Bus()
 
 
-def load_words(drive: Drive, machine: Machine, inverter: Inverter, sensors: Sensors) -> list[Word]:
+def load_words(drive: Drive, machine: Machine, inverter: Inverter, sensors: Sensors, bus: Bus = IDEAL) -> list[Word]:
     """Everything, the start first and its end last; DriveError where the motor cannot be what is asked for."""
     refuse(drive, machine, sensors)
     try:
         scale = motor_scale(machine, drive.inverter.dc_bus_v, drive.sensors.current_range_a, drive.core.clock_hz)
         values = motor_registers(scale, machine, inverter)._asdict() | {"u_dc": scale.u_dc(drive.inverter.dc_bus_v)}
+        values |= bus_registers(scale, bus)._asdict()
         values |= sensor_registers(drive, sensors, scale.current_a, scale.voltage_v)
         tables = motor_tables(scale, machine)
     except ValueError as error:
@@ -54,6 +56,7 @@ def refuse(drive: Drive, machine: Machine, sensors: Sensors) -> None:
         "[plant.sensors] eccentricity_twice_rad": sensors.eccentricity_twice_rad,
         "[plant.sensors] position_noise_rad": sensors.position_noise_rad,
         "[plant.machine] iron_conductance_s": machine.iron_conductance_s,
+        "[plant.machine] shorted_share": machine.shorted_share,
     }
     for key, value in absent.items():
         if value:

@@ -3,6 +3,7 @@
 
 scale = motor_scale(machine, u_dc_v, current_a, clock_hz)
 registers, tables = motor_registers(scale, machine, inverter), motor_tables(scale, machine)
+bus_registers(scale, bus)                            of the bus; the source's voltage is scale.u_dc(volts)
 machine_of(scale, registers, machine, inverter)      what the rounded registers say, in SI units
 """
 
@@ -13,11 +14,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fluxproof.plant.bus import Bus
 from fluxproof.plant.inverter import Inverter
 from fluxproof.plant.pmsm import SATURATED, Machine, currents_from_flux, harmonic_flux, machine_params
 from golden_model.fixed import Format
 from golden_model.formats import FLUX, MOTOR_SPEED, MOTOR_VOLTAGE, MOTOR_WAVE
-from golden_model.motor import motor_model
+from golden_model.motor import motor_bus, motor_model
 from golden_model.motor.motor_angle import POINTS
 from golden_model.motor.motor_current import POINT
 from golden_model.motor.motor_flux import CLOCKS_BITS
@@ -102,6 +104,24 @@ def motor_registers(
     limit = PORTS["stiffness"].fmt
     values["stiffness"] = min(values["stiffness"], limit.hi * limit.lsb)  # a softer snubber does no harm
     return Registers(**{name: code(name, values[name], port.fmt) for name, port in PORTS.items()})
+
+
+def bus_registers(scale: Scale, bus: Bus) -> motor_bus.Registers:
+    """Registers of the bus; ValueError where a value does not fit.  Without a capacitor the bus is its source.
+
+    A source without resistance has the smallest that fits: a time constant R C of 64 steps.
+    """
+    ports = {p.name: p.fmt for p in motor_bus.REGISTERS}
+    if bus.capacitance <= 0.0:
+        return motor_bus.Registers(0, 0, 0, 0)
+    stiff = ports["k_source"].hi * ports["k_source"].lsb
+    share = scale.step_s / bus.capacitance
+    return motor_bus.Registers(
+        inv_c=max(code("inv_c", share / STEP * scale.current_a / scale.voltage_v, ports["inv_c"]), 1),
+        k_source=code("k_source", share / bus.source_ohm if bus.source_ohm > 0.0 else stiff, ports["k_source"]),
+        k_brake=code("k_brake", share / bus.brake_ohm, ports["k_brake"]),
+        rectifier=int(bus.diode),
+    )
 
 
 def motor_tables(scale: Scale, machine: Machine) -> Tables:

@@ -59,6 +59,6 @@ def skewed_currents(state, params, skew_s):
     step = try_step(state, params, drive, skew_s)
     moved = state.copy()
     moved[L.LAMBDA_ALPHA], moved[L.LAMBDA_BETA] = step.lambda_alpha, step.lambda_beta
-    moved[L.OMEGA_M], moved[L.THETA_M] = step.omega, step.theta
+    moved[L.OMEGA_M], moved[L.THETA_M], moved[L.I_SHORT] = step.omega, step.theta, step.i_short
     refresh(moved, params)
     return moved[L.I_A], moved[L.I_B], moved[L.I_C]

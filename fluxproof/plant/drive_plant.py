@@ -14,7 +14,7 @@ from fluxproof.plant.averaged import advance_averaged, skewed_currents
 from fluxproof.plant.inverter import Inverter, inverter_params
 from fluxproof.plant.kernel import PlantParams, refresh
 from fluxproof.plant.mechanics import FREE, mechanics_params
-from fluxproof.plant.pmsm import flux_from_currents, harmonic_flux, machine_params, magnet_flux
+from fluxproof.plant.pmsm import flux_from_currents, harmonic_flux, machine_params, magnet_flux, short_time_constant
 from fluxproof.plant.switching import advance_switching
 
 
@@ -26,8 +26,13 @@ def plant_params(machine, inverter=None, mode=FREE, substeps=2, max_step_s=10e-6
     """
     if substeps < 1 or max_step_s <= 0.0:
         raise ValueError("substeps and max_step_s must be positive")
+    of_machine = machine_params(machine)
+    if short_time_constant(of_machine) < max_step_s:
+        raise ValueError(
+            f"the time constant of the short, {short_time_constant(of_machine):.2g} s, is below max_step_s"
+        )
     return PlantParams(
-        machine_params(machine),
+        of_machine,
         mechanics_params(machine, mode),
         inverter_params(inverter or Inverter()),
         int(substeps),

@@ -39,7 +39,9 @@ def sources(state, params, legs_v, legs_r, torque, load, acceleration):
     free, friction = 0.0, 0.0
     if mech.mode == FREE:
         free, friction = shaft_drive(mech, state[L.OMEGA_M], torque, load)
-    return Drive(psi_m, u_alpha, u_beta, r_aa, r_ab, r_bb, s_aa, s_ab, s_bb, free, friction, load, acceleration)
+    winding = hot * m.resistance[m.shorted_phase] * m.shorted_share * (1.0 - m.shorted_share)
+    short = m.shorted_resistance + winding
+    return Drive(psi_m, u_alpha, u_beta, r_aa, r_ab, r_bb, s_aa, s_ab, s_bb, free, friction, load, acceleration, short)
 
 
 @njit
@@ -50,10 +52,7 @@ def try_step(state, params, drive, step_s):
         params.mechanics,
         drive,
         step_s,
-        state[L.LAMBDA_ALPHA],
-        state[L.LAMBDA_BETA],
-        state[L.OMEGA_M],
-        state[L.THETA_M],
+        (state[L.LAMBDA_ALPHA], state[L.LAMBDA_BETA], state[L.OMEGA_M], state[L.THETA_M], state[L.I_SHORT]),
         state[L.I_D],
         state[L.I_Q],
     )
@@ -67,6 +66,7 @@ def accept(state, drive, step, step_s, period_s):
     state[L.LAMBDA_BETA] = step.lambda_beta
     state[L.OMEGA_M] = omega
     state[L.THETA_M] = theta
+    state[L.I_SHORT] = step.i_short
     share = step_s / period_s
     state[L.U_ALPHA] += share * (drive.u_alpha - drive.s_aa * step.i_alpha - drive.s_ab * step.i_beta)
     state[L.U_BETA] += share * (drive.u_beta - drive.s_ab * step.i_alpha - drive.s_bb * step.i_beta)
@@ -96,6 +96,7 @@ def refresh(state, params):
         state[L.LAMBDA_BETA],
         state[L.OMEGA_M],
         state[L.THETA_M],
+        state[L.I_SHORT],
         state[L.I_D],
         state[L.I_Q],
     )

@@ -46,7 +46,10 @@ PROBE_B = 25
 PROBE_C = 26
 PROBE_THETA_M = 27  # [rad]
 
-STATE_SIZE = 28
+# --- state variable of a shorted winding --------------------------------------
+I_SHORT = 28  # current through the short [A]
+
+STATE_SIZE = 29
 
 _NAMES = {
     name.lower(): value

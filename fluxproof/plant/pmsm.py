@@ -23,6 +23,13 @@ which fulfils the power balance exactly (psi includes psi_h).
 Iron loss is a conductance across the rotational EMF: the terminal current is
 i + g w J psi.  The transformer EMF is neglected, so the current is a function
 of the state and does not jump at the PWM edges.
+
+A short over the share mu of a phase's turns, with the resistance R_f and the leakage l of those turns, carries i_f:
+    l di_f/dt = mu u_phase - (R_f + mu (1 - mu) R_phase) i_f
+    magnetising and dissipating in R: terminal current less (2/3) mu i_f along the phase's axis
+All other flux of the turns is that of their phase, as L grows with the square of the turns in the models of Vaseghi
+(ICEM 2008) and Romeral (IEEE TIE 2011); the zero sequence of the winding's voltage is neglected, mu R i_f / 3.
+Power is exact: mu i_f u_phase heats the short and loads l.
 """
 
 import math
@@ -79,6 +86,10 @@ class Machine:
     cogging_amplitude_nm: float = 0.0
     cogging_order: int = 0  # per mechanical turn
     cogging_phase_rad: float = 0.0
+    shorted_share: float = 0.0  # of the turns of a phase, below 1
+    shorted_phase: int = 0  # 0, 1, 2: a, b, c
+    shorted_resistance_ohm: float = 0.0  # of the short itself
+    shorted_leakage_h: float = 0.0  # of the shorted turns; l / (R_f + mu R) must exceed the plant's step
     # Replaces L_d, L_q and the saturation; magnet_flux_wb then only scales harmonics and drift.
     flux_map: FluxMap | None = None
 
@@ -112,6 +123,12 @@ class MachineParams(NamedTuple):
     cogging_phase: float
     map_table: np.ndarray  # (2, n+2, m+2)
     map_axes: np.ndarray  # (4,)
+    shorted_phase: int
+    shorted_share: float  # mu
+    shorted_resistance: float  # R_f [ohm]
+    shorted_slope: float  # 1/l, 0.0 without a short [1/H]
+    shorted_alpha: float  # (2/3) mu along the phase's axis
+    shorted_beta: float
 
 
 def machine_params(machine):
@@ -122,6 +139,11 @@ def machine_params(machine):
             raise ValueError(f"{name} must be positive")
     if min(m.saturation_d_per_a2, m.saturation_q_per_a2, m.iron_conductance_s) < 0.0:
         raise ValueError("saturation and iron conductance must not be negative")
+    mu = float(m.shorted_share)
+    if not 0.0 <= mu < 1.0 or m.shorted_phase not in (0, 1, 2) or m.shorted_resistance_ohm < 0.0:
+        raise ValueError("a short has a share of 0 to below 1, a phase of 0, 1, 2, and no negative resistance")
+    if mu and m.shorted_leakage_h <= 0.0:
+        raise ValueError("shorted_leakage_h must be positive where shorted_share is")
     rows = []
     for h in m.emf_harmonics:
         per_turn = round(h.order * m.pole_pairs)
@@ -157,7 +179,21 @@ def machine_params(machine):
         cogging_phase=float(m.cogging_phase_rad),
         map_table=table,
         map_axes=axes,
+        shorted_phase=m.shorted_phase,
+        shorted_share=mu,
+        shorted_resistance=float(m.shorted_resistance_ohm),
+        shorted_slope=1.0 / m.shorted_leakage_h if mu else 0.0,
+        shorted_alpha=2.0 / 3.0 * mu * math.cos(2.0 * math.pi / 3.0 * m.shorted_phase),
+        shorted_beta=2.0 / 3.0 * mu * math.sin(2.0 * math.pi / 3.0 * m.shorted_phase),
     )
+
+
+def short_time_constant(m):
+    """l / (R_f + mu (1 - mu) R) [s] of the short in MachineParams; infinite without one."""
+    if m.shorted_share == 0.0:
+        return math.inf
+    winding = m.resistance[m.shorted_phase] * m.shorted_share * (1.0 - m.shorted_share)
+    return 1.0 / (m.shorted_slope * (m.shorted_resistance + winding))
 
 
 @njit

@@ -27,7 +27,7 @@ def _trial(state, params, v, r, load, acceleration, step_s):
     step = try_step(state, params, drive, step_s)
     moved = state.copy()
     moved[L.LAMBDA_ALPHA], moved[L.LAMBDA_BETA] = step.lambda_alpha, step.lambda_beta
-    moved[L.OMEGA_M], moved[L.THETA_M] = step.omega, step.theta
+    moved[L.OMEGA_M], moved[L.THETA_M], moved[L.I_SHORT] = step.omega, step.theta, step.i_short
     refresh(moved, params)
     return drive, step, moved
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from fluxproof.diagnosis.ground.plant_section import plant_of
 from fluxproof.hil.load import load_words
 from fluxproof.quote import c_comment
+from fluxproof.simulate.run import bus_of
 from golden_model.drive import Drive
 from golden_model.front_ends import Converters
 from golden_model.generated.register_names import ADDRESSES
@@ -24,11 +25,11 @@ def drive_of(drive: Drive) -> Drive:
 def header(path: str, drive: Drive) -> str:
     """What load_motor.c includes; DriveError where the motor in the FPGA cannot be that of the drive file."""
     plant = plant_of(path)
-    words = load_words(drive, plant.machine, plant.inverter, plant.sensors)
+    words = load_words(drive, plant.machine, plant.inverter, plant.sensors, bus_of(drive))
     rows = [f"    {{0x{ADDRESSES[name]:03X}, {value}}}, /* {name} */" for name, value in words]
     comment = c_comment(
-        f"{Path(path).name} by `fluxproof project --hil`: the motor in the FPGA, that of [machine], [inverter] and",
-        "[plant.*].  Write each value to its offset, in this order, with the gates off.",
+        f"{Path(path).name} by `fluxproof project --hil`: the motor in the FPGA, that of [machine], [inverter],",
+        "[supply] and [plant.*].  Write each value to its offset, in this order, with the gates off.",
     )
     lines = [comment, "#ifndef FLUXPROOF_MOTOR_H", "#define FLUXPROOF_MOTOR_H", "#include <stdint.h>", ""]
     lines += ["static const struct { uint16_t offset; int32_t value; } fluxproof_motor[] = {", *rows, "};", "#endif"]

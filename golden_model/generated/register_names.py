@@ -305,6 +305,10 @@ ADDRESSES = {
     "motor_k_j": 0x850,
     "motor_viscous": 0x854,
     "motor_coulomb": 0x858,
+    "motor_inv_c": 0x860,
+    "motor_k_source": 0x864,
+    "motor_k_brake": 0x868,
+    "motor_rectifier": 0x86C,
     "motor_scale_a": 0x880,
     "motor_scale_b": 0x884,
     "motor_scale_c": 0x888,
@@ -332,4 +336,5 @@ ADDRESSES = {
     "motor_theta_e": 0x918,
     "motor_shoot_through": 0x91C,
     "motor_ready": 0x920,
+    "motor_u_bus": 0x924,
 }

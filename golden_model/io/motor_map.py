@@ -15,7 +15,7 @@ from golden_model.fixed import Format
 from golden_model.formats import BIT, FLUX, MOTOR_ANGLE, MOTOR_SPEED, MOTOR_VOLTAGE, PU
 from golden_model.io import board_map, register_map
 from golden_model.io.register_map import Field, Kind, Register
-from golden_model.motor import motor_encoder, motor_model, motor_sensors
+from golden_model.motor import motor_bus, motor_encoder, motor_model, motor_sensors
 
 BASE, END = 0x800, 0xA00
 PREFIX = "motor_"
@@ -23,6 +23,7 @@ HALF_WORD = Format(0, 18, 0)
 
 _COMMANDS = """
     800 u_dc             804 load            808 start           80c hold           810 omega_set
+    860 inv_c            864 k_source        868 k_brake         86c rectifier
     820 stiffness        824 v_switch        828 v_diode         82c r_a            830 r_b             834 r_c
     838 psi_start        83c psi_m           840 inv_l_d         844 inv_l_q        848 pole_pairs
     850 k_j              854 viscous         858 coulomb
@@ -34,10 +35,11 @@ _COMMANDS = """
 _PULSES = "814 clear_faults  8d0 table_write"
 _STATUS = """
     900 i_a  904 i_b  908 i_c  90c torque  910 omega_m  914 theta_m  918 theta_e  91c shoot_through  920 ready
+    924 u_bus
 """
 COMMANDS, PULSES, STATUS = (register_map._table(text) for text in (_COMMANDS, _PULSES, _STATUS))
 _OWN = (  # inputs of the motor that are no registers of a block
-    Port("u_dc", MOTOR_VOLTAGE, doc="voltage of the bus"),
+    Port("u_dc", MOTOR_VOLTAGE, doc="voltage of the source; without a capacitor that of the bus"),
     Port("load", FLUX, doc="load torque"),
     Port("start", BIT, doc="1: the rotor is held at the angle zero, with the flux motor_psi_start"),
     Port("table_select", Format(0, 2, 0), doc="0 map, 1 harmonic fluxes, 2 cogging"),
@@ -55,12 +57,14 @@ _SHOWN = (
     Port("theta_e", MOTOR_ANGLE, doc="electrical angle"),
     Port("shoot_through", BIT, doc="1: both gates of a leg were on"),
     Port("ready", BIT, doc="1: the rotor is free"),
+    Port("u_bus", MOTOR_VOLTAGE, doc="voltage of the bus"),
 )
 
 _UNITS = {  # what 1.0 is: the bases of fluxproof/hil/registers.py
-    "U_motor": "u_dc v_switch v_diode", "I_motor": "i_a i_b i_c zero_a zero_b zero_c", "psi_motor": "psi_start psi_m",
+    "U_motor": "u_dc u_bus v_switch v_diode", "I_motor": "i_a i_b i_c zero_a zero_b zero_c",
+    "psi_motor": "psi_start psi_m",
     "T_motor": "load coulomb torque", "U_motor/I_motor": "r_a r_b r_c stiffness",
-    "I_motor/psi_motor": "inv_l_d inv_l_q",
+    "I_motor/psi_motor": "inv_l_d inv_l_q", "U_motor/(I_motor clock)": "inv_c", "1/step": "k_source k_brake",
     "turn": "angle_offset hall_offset theta_m theta_e", "turn/step": "omega_set omega_m", "turn/step^2/T_motor": "k_j",
     "T_motor step/turn": "viscous",
 }  # fmt: skip
@@ -69,8 +73,8 @@ UNITS = {PREFIX + name: unit for unit, names in _UNITS.items() for name in names
 
 def settings() -> dict[str, Port]:
     """The ports of the registers that software writes, without the prefix."""
-    blocks = (*motor_model.REGISTERS, *motor_sensors.BLOCK.registers, *motor_encoder.BLOCK.registers)
-    return {port.name: port for port in (*_OWN, *blocks)}
+    of_sensors = (*motor_sensors.BLOCK.registers, *motor_encoder.BLOCK.registers)
+    return {port.name: port for port in (*_OWN, *motor_model.REGISTERS, *motor_bus.REGISTERS, *of_sensors)}
 
 
 def motor_registers() -> list[Register]:

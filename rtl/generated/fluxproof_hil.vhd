@@ -176,6 +176,10 @@ architecture rtl of fluxproof_hil is
   signal motor_k_j           : unsigned(24 downto 0);
   signal motor_viscous       : unsigned(16 downto 0);
   signal motor_coulomb       : unsigned(22 downto 0);
+  signal motor_inv_c         : unsigned(23 downto 0);
+  signal motor_k_source      : unsigned(23 downto 0);
+  signal motor_k_brake       : unsigned(23 downto 0);
+  signal motor_rectifier     : std_logic;
   signal motor_scale_a       : signed(24 downto 0);
   signal motor_scale_b       : signed(24 downto 0);
   signal motor_scale_c       : signed(24 downto 0);
@@ -282,6 +286,7 @@ architecture rtl of fluxproof_hil is
   signal motor_omega_m       : signed(MOTOR_SPEED_W - 1 downto 0);
   signal motor_theta_m       : unsigned(MOTOR_ANGLE_W - 1 downto 0);
   signal motor_theta_e       : unsigned(MOTOR_ANGLE_W - 1 downto 0);
+  signal motor_u_bus         : signed(MOTOR_VOLTAGE_W - 1 downto 0);
   signal motor_shoot_through : std_logic;
   signal sample              : sample_t;
   signal core_settings       : settings_t;
@@ -488,6 +493,10 @@ begin
       motor_k_j           => motor_k_j,
       motor_viscous       => motor_viscous,
       motor_coulomb       => motor_coulomb,
+      motor_inv_c         => motor_inv_c,
+      motor_k_source      => motor_k_source,
+      motor_k_brake       => motor_k_brake,
+      motor_rectifier     => motor_rectifier,
       motor_scale_a       => motor_scale_a,
       motor_scale_b       => motor_scale_b,
       motor_scale_c       => motor_scale_c,
@@ -551,7 +560,8 @@ begin
       motor_theta_m       => motor_theta_m,
       motor_theta_e       => motor_theta_e,
       motor_shoot_through => motor_shoot_through,
-      motor_ready         => motor_ready
+      motor_ready         => motor_ready,
+      motor_u_bus         => motor_u_bus
     );
 
   core : entity work.fluxproof
@@ -908,6 +918,7 @@ begin
       gate_high           => gate_high_next,
       gate_low            => gate_low_next,
       sample_trigger      => trigger_next,
+      brake               => brake_next,
       motor_u_dc          => motor_u_dc,
       motor_load          => motor_load,
       motor_start         => motor_start,
@@ -928,6 +939,10 @@ begin
       motor_pole_pairs    => motor_pole_pairs,
       motor_hold          => motor_hold,
       motor_omega_set     => motor_omega_set,
+      motor_inv_c         => motor_inv_c,
+      motor_k_source      => motor_k_source,
+      motor_k_brake       => motor_k_brake,
+      motor_rectifier     => motor_rectifier,
       motor_table_write   => motor_table_write,
       motor_table_select  => motor_table_select,
       motor_table_at      => motor_table_at,
@@ -967,6 +982,7 @@ begin
       motor_omega_m       => motor_omega_m,
       motor_theta_m       => motor_theta_m,
       motor_theta_e       => motor_theta_e,
+      motor_u_bus         => motor_u_bus,
       motor_shoot_through => motor_shoot_through
     );
 

@@ -33,6 +33,7 @@ package fluxproof_pkg is
   constant SAMPLE_TIME_W : positive := 17;  -- U(-1,18)
   constant MOTOR_VOLTAGE_W : positive := 24;  -- S(1,22)
   constant MOTOR_LEG_W : positive := 29;  -- S(6,22)
+  constant MOTOR_CHARGE_W : positive := 25;  -- S(8,16)
   constant MOTOR_FLUX_W : positive := 40;  -- S(1,38)
   constant MOTOR_TRIG_W : positive := 18;  -- S(0,17)
   constant MOTOR_ANGLE_W : positive := 25;  -- U(0,25)
@@ -1437,6 +1438,14 @@ package fluxproof_pkg is
     15x"2c2e", 15x"2c92", 15x"2cf7", 15x"2d5b", 15x"2dc0", 15x"2e24", 15x"2e89", 15x"2eed",
     15x"2f52", 15x"2fb7", 15x"301b", 15x"3080", 15x"30e4", 15x"3149", 15x"31ad", 15x"3212"
   );
+
+  -- motor_bus: docs/hil.md: bus
+  constant MOTOR_BUS_LATENCY : positive := 8;
+  constant MOTOR_BUS_DROP : natural := 12;
+  constant MOTOR_BUS_DROP_U : natural := 18;
+
+  -- motor_charge: docs/hil.md: bus
+  constant MOTOR_CHARGE_LATENCY : positive := 1;
 
   -- motor_current: docs/hil.md: currents from fluxes
   constant MOTOR_CURRENT_LATENCY : positive := 19;

@@ -140,7 +140,7 @@ entity hil_register_file is
     trip_oversampling   : out unsigned(5 downto 0);  -- 5d0 bits from total to total of the fast overcurrent
     limit_high          : out unsigned(15 downto 0);  -- 5d4 total that trips, and above
     limit_low           : out unsigned(15 downto 0);  -- 5d8 total that trips, and below
-    motor_u_dc          : out signed(23 downto 0);  -- 800 voltage of the bus
+    motor_u_dc          : out signed(23 downto 0);  -- 800 voltage of the source; without a capacitor that of the bus
     motor_load          : out signed(24 downto 0);  -- 804 load torque
     motor_start         : out std_logic;  -- 808 1: the rotor is held at the angle zero, with the flux motor_psi_start
     motor_hold          : out std_logic;  -- 80c 1: the speed is omega_set
@@ -160,6 +160,10 @@ entity hil_register_file is
     motor_k_j           : out unsigned(24 downto 0);  -- 850 speed per torque and step: one over the inertia
     motor_viscous       : out unsigned(16 downto 0);  -- 854 torque per speed
     motor_coulomb       : out unsigned(22 downto 0);  -- 858 Coulomb friction torque
+    motor_inv_c         : out unsigned(23 downto 0);  -- 860 voltage per charge: one over the capacitance; 0: the bus is the source
+    motor_k_source      : out unsigned(23 downto 0);  -- 864 share of the difference to the source that flows in a step
+    motor_k_brake       : out unsigned(23 downto 0);  -- 868 share of the voltage that the brake resistor takes in a step
+    motor_rectifier     : out std_logic;  -- 86c 1: the source takes nothing back
     motor_scale_a       : out signed(24 downto 0);  -- 880 code per current, phase a
     motor_scale_b       : out signed(24 downto 0);  -- 884 code per current, phase b
     motor_scale_c       : out signed(24 downto 0);  -- 888 code per current, phase c
@@ -223,7 +227,8 @@ entity hil_register_file is
     motor_theta_m       : in  unsigned(24 downto 0);  -- 914 mechanical angle
     motor_theta_e       : in  unsigned(24 downto 0);  -- 918 electrical angle
     motor_shoot_through : in  std_logic;  -- 91c 1: both gates of a leg were on
-    motor_ready         : in  std_logic  -- 920 1: the rotor is free
+    motor_ready         : in  std_logic;  -- 920 1: the rotor is free
+    motor_u_bus         : in  signed(23 downto 0)  -- 924 voltage of the bus
   );
 end entity hil_register_file;
 
@@ -1252,6 +1257,22 @@ begin
         motor_coulomb <= unsigned(held(22 downto 0));
         written(534)  <= '1';
       end if;
+      if (row(67) and column(0)) = '1' then
+        motor_inv_c  <= unsigned(held(23 downto 0));
+        written(536) <= '1';
+      end if;
+      if (row(67) and column(1)) = '1' then
+        motor_k_source <= unsigned(held(23 downto 0));
+        written(537)   <= '1';
+      end if;
+      if (row(67) and column(2)) = '1' then
+        motor_k_brake <= unsigned(held(23 downto 0));
+        written(538)  <= '1';
+      end if;
+      if (row(67) and column(3)) = '1' then
+        motor_rectifier <= held(0);
+        written(539)    <= '1';
+      end if;
       if (row(68) and column(0)) = '1' then
         motor_scale_a <= signed(held(24 downto 0));
         written(544)  <= '1';
@@ -1551,6 +1572,10 @@ begin
         motor_k_j                 <= (others => '0');
         motor_viscous             <= (others => '0');
         motor_coulomb             <= (others => '0');
+        motor_inv_c               <= (others => '0');
+        motor_k_source            <= (others => '0');
+        motor_k_brake             <= (others => '0');
+        motor_rectifier           <= '0';
         motor_scale_a             <= (others => '0');
         motor_scale_b             <= (others => '0');
         motor_scale_c             <= (others => '0');
@@ -1832,6 +1857,7 @@ begin
   shown(582)         <= std_logic_vector(resize(motor_theta_e, 32));
   shown(583)         <= "0000000000000000000000000000000" & motor_shoot_through;
   shown(584)         <= "0000000000000000000000000000000" & motor_ready;
-  shown(585 to 1023) <= (others => (others => '0'));
+  shown(585)         <= "" & std_logic_vector(resize(motor_u_bus, 32));
+  shown(586 to 1023) <= (others => (others => '0'));
 
 end architecture rtl;

@@ -47,6 +47,10 @@ entity core_and_motor is
     motor_pole_pairs    : in  unsigned(4 downto 0);
     motor_hold          : in  std_logic;
     motor_omega_set     : in  signed(17 downto 0);
+    motor_inv_c         : in  unsigned(23 downto 0);
+    motor_k_source      : in  unsigned(23 downto 0);
+    motor_k_brake       : in  unsigned(23 downto 0);
+    motor_rectifier     : in  std_logic;
     motor_table_write   : in  std_logic;
     motor_table_select  : in  unsigned(1 downto 0);
     motor_table_at      : in  unsigned(11 downto 0);
@@ -79,12 +83,14 @@ entity core_and_motor is
     motor_omega_m       : out signed(MOTOR_SPEED_W - 1 downto 0);
     motor_theta_m       : out unsigned(MOTOR_ANGLE_W - 1 downto 0);
     motor_theta_e       : out unsigned(MOTOR_ANGLE_W - 1 downto 0);
+    motor_u_bus         : out signed(MOTOR_VOLTAGE_W - 1 downto 0);
     motor_shoot_through : out std_logic
   );
 end entity core_and_motor;
 
 architecture rtl of core_and_motor is
   signal trigger    : std_logic;
+  signal brake      : std_logic;
   signal sample     : sample_t;
   signal entered    : std_logic;
   signal converted  : std_logic;
@@ -125,7 +131,7 @@ begin
       clk => clk, rst => rst, sample_valid => entered, sample => sample, settings => settings, enable => enable,
       trip => trip, clear_trip => clear_trip, host_write => host_write, gate_high => gate_high, gate_low => gate_low,
       sample_trigger => trigger, running => running, tripped => tripped, fault_flags => fault_flags,
-      values_valid => values_valid, observed => observed, estimated => estimated, sample_busy => open, brake => open,
+      values_valid => values_valid, observed => observed, estimated => estimated, sample_busy => open, brake => brake,
       first_fault => open, early_samples => open, setting_refused => open, min_pulse_used => open,
       double_used => open, carrier => open, duty_valid => open, compare_valid => open
     );
@@ -133,7 +139,7 @@ begin
   load_machine : entity work.motor_bench
     generic map (ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS)
     port map (
-      clk => clk, rst => rst, gate_high => gate_high, gate_low => gate_low, sample_trigger => trigger,
+      clk => clk, rst => rst, gate_high => gate_high, gate_low => gate_low, sample_trigger => trigger, brake => brake,
       motor_u_dc => motor_u_dc, motor_load => motor_load, motor_start => motor_start,
       motor_clear_faults => motor_clear_faults, motor_stiffness => motor_stiffness, motor_v_switch => motor_v_switch,
       motor_v_diode => motor_v_diode, motor_r_a => motor_r_a, motor_r_b => motor_r_b, motor_r_c => motor_r_c,
@@ -147,7 +153,9 @@ begin
       motor_zero_u => motor_zero_u, motor_noise_i => motor_noise_i, motor_noise_u => motor_noise_u,
       motor_angle_offset => motor_angle_offset, motor_i_a => motor_i_a, motor_i_b => motor_i_b, motor_i_c => motor_i_c,
       motor_torque => motor_torque, motor_omega_m => motor_omega_m, motor_theta_m => motor_theta_m,
-      motor_theta_e => motor_theta_e, motor_shoot_through => motor_shoot_through,
+      motor_theta_e => motor_theta_e, motor_inv_c => motor_inv_c, motor_k_source => motor_k_source,
+      motor_k_brake => motor_k_brake, motor_rectifier => motor_rectifier, motor_u_bus => motor_u_bus,
+      motor_shoot_through => motor_shoot_through,
       motor_table_high => motor_table_word(35 downto 18), motor_table_low => motor_table_word(17 downto 0),
       motor_counts => (others => '0'), motor_hall_offset => (others => '0'), codes_valid => converted, code_a => code_a,
       code_b => code_b, code_c => code_c, code_u_dc => code_u_dc, code_theta => code_theta, position_now => open,

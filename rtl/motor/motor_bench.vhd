@@ -2,6 +2,7 @@
 -- Purpose: a motor to test against: gates in; codes of a sample, encoder pins and the motor's values out.
 -- Only wiring.  At sample_trigger currents, bus and angle are held, as converters do; their codes come 12 clocks later.
 -- position_now: the code of the angle of now, for a front end that latches it at the trigger.
+-- The bus voltage holds for a step; the charge of the step before and the brake resistor change that of the next one.
 -- Formats: those of the blocks; docs/hil.md.
 -- Latency: 12 clocks from sample_trigger to codes_valid.  Interval: as far as that.
 -- Rounding: the code of the angle is cut.
@@ -22,6 +23,7 @@ entity motor_bench is
     gate_high           : in  unsigned(2 downto 0);
     gate_low            : in  unsigned(2 downto 0);
     sample_trigger      : in  std_logic;
+    brake               : in  std_logic;
     motor_u_dc          : in  signed(MOTOR_VOLTAGE_W - 1 downto 0);
     motor_load          : in  signed(FLUX_W - 1 downto 0);
     motor_start         : in  std_logic;
@@ -42,6 +44,10 @@ entity motor_bench is
     motor_pole_pairs    : in  unsigned(4 downto 0);
     motor_hold          : in  std_logic;
     motor_omega_set     : in  signed(17 downto 0);
+    motor_inv_c         : in  unsigned(23 downto 0);
+    motor_k_source      : in  unsigned(23 downto 0);
+    motor_k_brake       : in  unsigned(23 downto 0);
+    motor_rectifier     : in  std_logic;
     motor_table_write   : in  std_logic;
     motor_table_select  : in  unsigned(1 downto 0);
     motor_table_at      : in  unsigned(11 downto 0);
@@ -81,12 +87,21 @@ entity motor_bench is
     motor_omega_m       : out signed(MOTOR_SPEED_W - 1 downto 0);
     motor_theta_m       : out unsigned(MOTOR_ANGLE_W - 1 downto 0);
     motor_theta_e       : out unsigned(MOTOR_ANGLE_W - 1 downto 0);
+    motor_u_bus         : out signed(MOTOR_VOLTAGE_W - 1 downto 0);
     motor_shoot_through : out std_logic
   );
 end entity motor_bench;
 
 architecture rtl of motor_bench is
   signal held      : std_logic;
+  signal tick      : std_logic;
+  signal ticked    : std_logic_vector(1 to 2);
+  signal brake_1   : std_logic;
+  signal starts    : std_logic;
+  signal start_1   : std_logic;
+  signal charge    : signed(MOTOR_CHARGE_W - 1 downto 0);
+  signal u_bus     : signed(MOTOR_VOLTAGE_W - 1 downto 0);
+  signal u_next    : signed(MOTOR_VOLTAGE_W - 1 downto 0);
   signal i_a_1     : signed(PU_W - 1 downto 0);
   signal i_b_1     : signed(PU_W - 1 downto 0);
   signal i_c_1     : signed(PU_W - 1 downto 0);
@@ -97,6 +112,9 @@ begin
   seen         <= motor_theta_m + motor_angle_offset;
   position_now <= seen(MOTOR_ANGLE_W - 1 downto MOTOR_ANGLE_W - POSITION_BITS);
 
+  starts <= motor_start or not motor_ready;
+  u_next <= motor_u_dc when starts = '1' else u_bus;
+
   -- Sample and hold
   process (clk)
   begin
@@ -106,7 +124,7 @@ begin
         i_a_1     <= motor_i_a;
         i_b_1     <= motor_i_b;
         i_c_1     <= motor_i_c;
-        u_dc_1    <= motor_u_dc;
+        u_dc_1    <= motor_u_bus;
         theta_m_1 <= motor_theta_m;
       end if;
 
@@ -123,15 +141,46 @@ begin
     end if;
   end process;
 
+  -- The bus of a step, charged while the motor starts, and when the charge of the last one is there
+  process (clk)
+  begin
+    if rising_edge(clk) then
+      ticked <= tick & ticked(1);
+      if tick = '1' then
+        motor_u_bus <= u_next;
+        brake_1     <= brake;
+        start_1     <= starts;
+      end if;
+
+      if rst = '1' then
+        ticked      <= (others => '0');
+        motor_u_bus <= (others => '0');
+      end if;
+    end if;
+  end process;
+
+  bus_charge : entity work.motor_charge
+    port map (
+      clk => clk, rst => rst, tick => tick, gate_high => gate_high, gate_low => gate_low, i_a => motor_i_a,
+      i_b => motor_i_b, i_c => motor_i_c, charge => charge
+    );
+
+  bus_voltage : entity work.motor_bus
+    port map (
+      clk => clk, rst => rst, in_valid => ticked(2), charge => charge, u_source => motor_u_dc, brake => brake_1,
+      start => start_1, inv_c => motor_inv_c, k_source => motor_k_source, k_brake => motor_k_brake,
+      rectifier => motor_rectifier, out_valid => open, u_dc => u_bus
+    );
+
   load_machine : entity work.motor_model
     port map (
-      clk => clk, rst => rst, gate_high => gate_high, gate_low => gate_low, u_dc => motor_u_dc, load => motor_load,
+      clk => clk, rst => rst, gate_high => gate_high, gate_low => gate_low, u_dc => u_next, load => motor_load,
       start => motor_start, clear_faults => motor_clear_faults, stiffness => motor_stiffness,
       v_switch => motor_v_switch, v_diode => motor_v_diode, r_a => motor_r_a, r_b => motor_r_b, r_c => motor_r_c,
       psi_start => motor_psi_start, psi_m => motor_psi_m, inv_l_d => motor_inv_l_d, inv_l_q => motor_inv_l_q,
       k_j => motor_k_j, viscous => motor_viscous, coulomb => motor_coulomb, pole_pairs => motor_pole_pairs,
       hold => motor_hold, omega_set => motor_omega_set, table_write => motor_table_write,
-      table_select => motor_table_select, table_at => motor_table_at, table_word => motor_table_high & motor_table_low, tick => open,
+      table_select => motor_table_select, table_at => motor_table_at, table_word => motor_table_high & motor_table_low, tick => tick,
       ready => motor_ready, i_a => motor_i_a, i_b => motor_i_b, i_c => motor_i_c, torque => motor_torque,
       omega_m => motor_omega_m, theta_m => motor_theta_m, theta_e => motor_theta_e,
       shoot_through => motor_shoot_through

@@ -46,6 +46,7 @@ HIL = Top(
         ("load_machine", "gate_high"): "gate_high_next",
         ("load_machine", "gate_low"): "gate_low_next",
         ("load_machine", "sample_trigger"): "trigger_next",
+        ("load_machine", "brake"): "brake_next",
         ("load_machine", "codes_valid"): "codes_valid_in",
         ("load_machine", "position_now"): "position_in",
         **{("load_machine", f"code_{x}"): f"code_{x}_in" for x in ("a", "b", "c", "u_dc")},

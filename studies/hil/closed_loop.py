@@ -17,24 +17,27 @@ from fluxproof.checkout import DRIVES
 from fluxproof.cosim.closed_loop import gate_words
 from fluxproof.cosim.flat import FLAT
 from fluxproof.cosim.golden_clock import GoldenClock
+from fluxproof.cosim.golden_loop import mixed_kernel
 from fluxproof.cosim.sleeping import with_sleep
 from fluxproof.cosim.verilated import VerilatedCore
-from fluxproof.hil.registers import Scale, motor_registers, motor_scale, motor_tables
+from fluxproof.hil.registers import Scale, bus_registers, motor_registers, motor_scale, motor_tables
+from fluxproof.plant.bus import Bus
 from golden_model import fluxproof
 from golden_model.drive import Drive, load
-from golden_model.motor import motor_model, motor_sensors, motor_shaft
+from golden_model.motor import motor_bench, motor_bus, motor_model, motor_sensors, motor_shaft
 from golden_model.motor.motor_model import STEP
 from golden_model.registers import RegisterSet, registers
 from golden_model.units import from_si
 from studies.hil import golden as golden_loop
-from studies.hil.beside_plant import follow
 from studies.hil.drive import SERVO, SWITCHES
 from studies.hil.equal import write_tables
 from studies.hil.figure import least, most
 
 CHAIN, SHAFT = 40, 53  # clocks from a tick to its currents, to its angle
 CONVERSION = 13  # clocks from sample_trigger to sample_valid
+MotorInputs, bench_step = motor_model.Inputs, motor_bench.step
 SPEED_RAD_S, LOAD_NM = 100.0, 0.1
+BUS = Bus(capacitance=470e-6, source_ohm=0.1, diode=True, brake_ohm=5.0)
 PERIODS = 300
 HELD = 200  # periods of a speed
 
@@ -48,11 +51,12 @@ class Parts(NamedTuple):
     motor: motor_model.Registers
     tables: motor_model.Tables
     sensors: motor_sensors.Registers
+    bus: motor_bus.Registers
 
 
-def parts() -> Parts:
-    """The drive file's core and sensors with the motor of the study."""
-    drive = load(DRIVES / "servo_24v.toml")
+def parts(drive: Drive | None = None) -> Parts:
+    """The core and the sensors of a drive, by default servo_24v, with the motor of the study."""
+    drive = drive or load(DRIVES / "servo_24v.toml")
     of_core, sensors = registers(drive), drive.sensors
     scale = motor_scale(SERVO, drive.inverter.dc_bus_v, sensors.current_range_a, drive.core.clock_hz)
     unit = 1 << motor_sensors.SENSOR_GAIN.frac_bits
@@ -60,41 +64,53 @@ def parts() -> Parts:
     scales = {"scale_a": unit, "scale_b": unit, "scale_c": unit, "scale_u": bus}
     still = dict.fromkeys(motor_sensors.Registers._fields, 0) | scales | {"noise_i": 20}
     motor, tables = motor_registers(scale, SERVO, SWITCHES), motor_tables(scale, SERVO)
-    return Parts(drive, of_core, scale, motor, tables, motor_sensors.Registers(**still))
+    bus = bus_registers(scale, BUS)
+    return Parts(drive, of_core, scale, motor, tables, motor_sensors.Registers(**still), bus)
+
+
+@mixed_kernel
+def follow(bench, words, u_dc, load, motor, bus, tables):
+    """The motor through whole steps, from the gates of each of their clocks; the brake resistor stays off."""
+    counts = np.zeros(6, np.int64)
+    for n in range(len(words) // STEP):
+        counts[:] = 0
+        for word in words[n * STEP : (n + 1) * STEP]:
+            for k in range(6):
+                counts[k] += word >> k & 1
+        now = MotorInputs(u_dc, load, 0, counts[0], counts[3], counts[1], counts[4], counts[2], counts[5])
+        bench, _ = bench_step(bench, now, 0, motor, bus, tables, STEP)
+    return bench
 
 
 class GoldenMotor:
     """The golden motor clock by clock, from the gates that it is given."""
 
     def __init__(self, of: Parts):
-        self.of, self.ticks, self.word = of, 0, 0
+        self.of, self.ticks = of, 0
         self.u_dc = of.scale.u_dc(of.drive.inverter.dc_bus_v)
-        self.state, _ = self._tick(motor_model.State(), 0)
+        self.state, _ = self._tick(motor_bench.State(), 0)
         self.random = motor_sensors.State()
 
     def _tick(self, state, load_code):
         inputs = motor_model.Inputs(u_dc=self.u_dc, load=load_code)
-        return motor_model.step(state, inputs, self.of.motor, self.of.tables, STEP)
+        return motor_bench.step(state, inputs, 0, self.of.motor, self.of.bus, self.of.tables, STEP)
 
     def advance(self, words: np.ndarray, clock: int, load_code: int) -> None:
         """Up to the last tick at or before ``clock``; ``words``: the gates of every clock so far."""
         steps = clock // STEP - self.ticks
-        part = words[self.ticks * STEP : (self.ticks + steps) * STEP]
-        at = np.flatnonzero(np.diff(part, prepend=self.word))
-        events = (at.astype(np.int64), (part[at] << 6) | (63 & ~part[at]), len(at))
-        self.state, self.word = follow(
-            self.state, self.word, events, steps, self.u_dc, load_code, self.of.motor, self.of.tables
-        )
+        part = words[self.ticks * STEP : (self.ticks + steps) * STEP].astype(np.int64)
+        self.state = follow(self.state, part, self.u_dc, load_code, self.of.motor, self.of.bus, self.of.tables)
         self.ticks += steps
 
     def codes(self, clock: int, load_code: int) -> tuple[int, ...]:
         """What the sensors say of the currents and the angle that stand at the outputs at ``clock``."""
-        s = self.state
+        s = self.state.motor
         chain = (s.chain_1, s.chain_2, s.chain_3, s.chain_4)[self.ticks - (clock - CHAIN) // STEP]
         theta = s.of_shaft.theta >> motor_shaft.DROP_THETA
         if self.ticks - (clock - SHAFT) // STEP == 3:  # the shaft's next step is done already
-            theta = self._tick(s, load_code)[1].theta_m
-        seen = motor_sensors.Inputs(chain.i_a, chain.i_b, chain.i_c, self.u_dc, theta)
+            theta = self._tick(self.state, load_code)[1].theta_m
+        u_dc = self.state.u_dc_1 if clock % STEP == 0 else self.state.u_dc
+        seen = motor_sensors.Inputs(chain.i_a, chain.i_b, chain.i_c, u_dc, theta)
         config = self.of.core.config
         self.random, codes = motor_sensors.step(
             self.random, seen, self.of.sensors, config.adc_bits, config.position_bits
@@ -145,7 +161,8 @@ def rtl_of(of: Parts, rewrite: Callable[[str], str]) -> VerilatedCore:
     generics = {"ADC_BITS": config.adc_bits, "POSITION_BITS": config.position_bits, "CARRIER_HALF": config.carrier_half}
     core = VerilatedCore(generics, top=f"core_and_motor{FLAT}", rewrite=rewrite)
     core.set_many(of.core.values._asdict())
-    core.set_many({f"motor_{name}": value for name, value in {**of.motor._asdict(), **of.sensors._asdict()}.items()})
+    of_motor = {**of.motor._asdict(), **of.sensors._asdict(), **of.bus._asdict()}
+    core.set_many({f"motor_{name}": value for name, value in of_motor.items()})
     core.set("motor_u_dc", of.scale.u_dc(of.drive.inverter.dc_bus_v))
     core.set_many({name if name in core.inputs else f"{name}_in": v for name, v in references(of).items()})
     write_tables(core, of.tables, "motor_")
@@ -191,7 +208,7 @@ def long_run(periods: int) -> Long:
     asked = np.array([[*given.values(), 0]] * periods, np.int64)
     asked[:, list(given).index("omega_ref")] = omega
     u_dc = of.scale.u_dc(of.drive.inverter.dc_bus_v)
-    hil = golden_loop.Hil(of.core.values, of.core.config, of.motor, of.tables, of.sensors, u_dc)
+    hil = golden_loop.Hil(of.core.values, of.core.config, of.motor, of.tables, of.sensors, u_dc, of.bus)
     _, observed = golden_loop.record(hil, asked, golden_loop.constant(of.motor, periods))
     names = list(observed)
     wanted = np.stack([observed[name] for name in names], axis=1)

@@ -3,6 +3,7 @@
 
 The same sequence as closed_loop.golden_run, which a test compares: a sample is taken at the trigger, CONVERSION clocks
 later the core gets its codes; the motor makes a step every STEP clocks.  The shaft is held at a speed for each period.
+A run goes on from where the last one ended, so that software may write settings, enable and a position in between.
 """
 
 from __future__ import annotations
@@ -11,17 +12,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fluxproof.commission.simulated_loop import LAST_ANGLE, SOURCE, forced_code
 from fluxproof.cosim.golden_loop import mixed_kernel
 from golden_model import clocked, fluxproof
-from golden_model.motor import motor_model, motor_sensors, motor_shaft
+from golden_model.motor import motor_bench, motor_bus, motor_model, motor_sensors, motor_shaft
 
 CHAIN, SHAFT = 40, 53  # clocks from a tick to its currents, to its angle
 CONVERSION = 13  # clocks from sample_trigger to sample_valid
 STEP, DROP_THETA = motor_model.STEP, motor_shaft.DROP_THETA
-core_step, motor_step, sensors_step = clocked.step, motor_model.step, motor_sensors.step
+core_step, bench_step, sensors_step = clocked.step, motor_bench.step, motor_sensors.step
 MotorRegisters = motor_model.Registers
 CoreInputs, MotorInputs, SensorInputs = clocked.Inputs, motor_model.Inputs, motor_sensors.Inputs
-sample_step, given_by_registers, Sample = fluxproof.step_given, fluxproof.given_by_registers, fluxproof.Sample
+sample_step, Given, Sample = fluxproof.step_given, fluxproof.Given, fluxproof.Sample
 DUE = {name: after for after, names in clocked.DUE.values() for name in names}
 CHECKS, ZERO, MOTION, EMF = DUE["sample_faults"], DUE["current_offset"], DUE["motion_faults"], DUE["encoder_lost"]
 LOAD, BRAKE, COMPARE = DUE["open_load"], DUE["brake_asked"], DUE["compare_a"]
@@ -35,7 +37,8 @@ class Hil(NamedTuple):
     motor: motor_model.Registers
     tables: motor_model.Tables
     sensors: motor_sensors.Registers
-    u_dc: int
+    u_dc: int  # of the source
+    bus: motor_bus.Registers = motor_bus.Registers(0, 0, 0, 0)  # no capacitor
 
 
 class Moving(NamedTuple):
@@ -75,27 +78,54 @@ def chosen(chains, behind):
     return chains[3]
 
 
-@mixed_kernel
-def run_clocks(hil, asked, moving, states, samples, observed):
-    """Fills a row of ``samples`` and ``observed`` in each period.
+class Host(NamedTuple):
+    """What software has written beside the settings."""
 
-    ``asked`` (n, 7): the fields of Sample after the codes, without run; ``moving``: see Moving.
-    ``states``: of core, its samples, motor and sensors.
+    enable: int = 1
+    clear_trip: int = 0  # at the first of the clocks
+    write: int = 0  # anything, at the first of the clocks
+
+
+class Carry(NamedTuple):
+    """All that the next clock needs: models, what is between them, the outputs after the last clock."""
+
+    core: clocked.State
+    of_samples: fluxproof.State
+    motor: motor_bench.State
+    random: motor_sensors.State
+    old: clocked.Inputs  # results of the sample before the last one
+    new: clocked.Inputs
+    entered_at: int
+    valid_at: int
+    clock: int
+    word: int  # gates
+    codes: tuple[int, ...]  # of the sensors
+    counts: tuple[int, ...]  # clocks of each gate since the last tick
+    fault_flags: int
+    first_fault: int
+    tripped: int
+
+
+@mixed_kernel
+def run_clocks(hil, asked, moving, host, forced, carry, samples, observed):
+    """Fills a row of ``samples`` and ``observed`` in each period, the clock at which the last sample enters included.
+
+    ``asked`` (n, 7): the fields of Sample after the codes, without run; ``moving``: see Moving; ``forced`` (6,): the
+    position that the host gives, see commission.simulated_loop; ``carry``: of the last call.
     """
-    core, of_samples, motor, random = states
     regs, config, motor_regs = hil.core, hil.config, written(hil.motor, moving, 0)
     still = MotorInputs(hil.u_dc, 0, 0, 0, 0, 0, 0, 0, 0)
-    motor, _ = motor_step(motor, still, motor_regs, hil.tables, STEP)
-    nothing = CoreInputs(0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
-    old, new, entered_at, valid_at, clock, word, row = nothing, nothing, -1, -1, 0, 0, 0
-    codes = (0, 0, 0, 0, 0)
-    counts = np.zeros(6, np.int64)
+    core, of_samples, motor, random, old, new, entered_at, valid_at, clock, word, codes, of_gates, _, _, _ = carry
+    fault_flags, first_fault, tripped = carry.fault_flags, carry.first_fault, carry.tripped
+    counts, row, first = np.zeros(6, np.int64), 0, 1
+    for k in range(6):
+        counts[k] = of_gates[k]
     while row < len(samples):
         for k in range(6):
             counts[k] += word >> k & 1
         age = clock - entered_at
         inputs = CoreInputs(
-            1 if clock == valid_at else 0, 1, 0, 0, 0,
+            1 if clock == valid_at else 0, host.enable, 0, host.clear_trip * first, host.write * first,
             new.sample_faults if age >= CHECKS else old.sample_faults,
             new.sample_trip if age >= CHECKS else old.sample_trip,
             new.current_offset if age >= ZERO else old.current_offset,
@@ -108,14 +138,21 @@ def run_clocks(hil, asked, moving, states, samples, observed):
             new.compare_b if age >= COMPARE else old.compare_b,
             new.compare_c if age >= COMPARE else old.compare_c,
         )  # fmt: skip
+        first = 0
         running = core.of_gate_generation.running
         core, entered, seen = core_step(core, inputs, regs, config.carrier_half)
         if entered:
             x = asked[row]
+            code, jumped = forced_code(forced, codes[4], 0, config.position_bits)
             sample = Sample(
-                codes[0], codes[1], codes[2], codes[3], codes[4], x[0], x[1], x[2], x[3], x[4], x[5], x[6], running
+                codes[0], codes[1], codes[2], codes[3], code, x[0], x[1], x[2], x[3], x[4], x[5], x[6], running
             )
-            of_samples, o = sample_step(of_samples, sample, regs, config, given_by_registers(regs))
+            by_code = 1 if forced[SOURCE] == 0 else 0
+            given = Given(
+                regs.speed_given * by_code, regs.omega_given, 1 if jumped else regs.position_restart,
+                regs.emf_samples * by_code,
+            )  # fmt: skip
+            of_samples, o = sample_step(of_samples, sample, regs, config, given)
             for k, value in enumerate(sample):
                 samples[row, k] = value
             for k, value in enumerate(o):
@@ -131,21 +168,40 @@ def run_clocks(hil, asked, moving, states, samples, observed):
         clock += 1
         if clock % STEP == 0:
             now = MotorInputs(hil.u_dc, 0, 0, counts[0], counts[3], counts[1], counts[4], counts[2], counts[5])
-            motor, _ = motor_step(motor, now, motor_regs, hil.tables, STEP)
+            motor, _ = bench_step(motor, now, seen.brake, motor_regs, hil.bus, hil.tables, STEP)
             counts[:] = 0
         word = seen.gate_high | seen.gate_low << 3
+        fault_flags, first_fault, tripped = seen.fault_flags, seen.first_fault, seen.tripped
         if seen.sample_trigger:
             ticks = clock // STEP
-            chains = (motor.chain_1, motor.chain_2, motor.chain_3, motor.chain_4)
+            of_motor = motor.motor
+            chains = (of_motor.chain_1, of_motor.chain_2, of_motor.chain_3, of_motor.chain_4)
             chain = chosen(chains, ticks - (clock - CHAIN) // STEP)
-            theta = motor.of_shaft.theta >> DROP_THETA
+            theta = of_motor.of_shaft.theta >> DROP_THETA
             if ticks - (clock - SHAFT) // STEP == 3:  # the shaft's next step is done already
-                _, ahead = motor_step(motor, still, motor_regs, hil.tables, STEP)
+                _, ahead = bench_step(motor, still, 0, motor_regs, hil.bus, hil.tables, STEP)
                 theta = ahead.theta_m
-            at = SensorInputs(chain.i_a, chain.i_b, chain.i_c, hil.u_dc, theta)
+            u_dc = motor.u_dc_1 if clock % STEP == 0 else motor.u_dc
+            at = SensorInputs(chain.i_a, chain.i_b, chain.i_c, u_dc, theta)
             random, codes = sensors_step(random, at, hil.sensors, config.adc_bits, config.position_bits)
             valid_at = clock + CONVERSION
-    return clock
+    of_gates = (counts[0], counts[1], counts[2], counts[3], counts[4], counts[5])
+    return Carry(
+        core, of_samples, motor, random, old, new, entered_at, valid_at, clock, word, codes, of_gates, fault_flags,
+        first_fault, tripped,
+    )  # fmt: skip
+
+
+def start(hil: Hil, moving: Moving) -> Carry:
+    """The carry of the first call: after the reset, the motor has made its first step."""
+    still, regs = MotorInputs(u_dc=hil.u_dc), written(hil.motor, moving, 0)
+    motor, _ = bench_step(motor_bench.State(), still, 0, regs, hil.bus, hil.tables, STEP)
+    none = CoreInputs(enable=1)
+    return Carry(
+        core=clocked.State(), of_samples=fluxproof.State(), motor=motor, random=motor_sensors.State(), old=none,
+        new=none, entered_at=-1, valid_at=-1, clock=0, word=0, codes=(0,) * 5, counts=(0,) * 6, fault_flags=0,
+        first_fault=0, tripped=0,
+    )  # fmt: skip
 
 
 def record(hil: Hil, asked: np.ndarray, moving: Moving) -> tuple[np.ndarray, dict[str, np.ndarray]]:
@@ -153,6 +209,5 @@ def record(hil: Hil, asked: np.ndarray, moving: Moving) -> tuple[np.ndarray, dic
     names = fluxproof.Observed._fields
     samples = np.zeros((len(asked), len(fluxproof.Sample._fields)), np.int64)
     observed = np.zeros((len(asked), len(names)), np.int64)
-    states = (clocked.State(), fluxproof.State(), motor_model.State(), motor_sensors.State())
-    run_clocks(hil, asked, moving, states, samples, observed)
+    run_clocks(hil, asked, moving, Host(), np.zeros(LAST_ANGLE + 1, np.int64), start(hil, moving), samples, observed)
     return samples, dict(zip(names, observed.T, strict=True))

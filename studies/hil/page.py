@@ -23,7 +23,7 @@ def figures(_options) -> list[dict]:
     both = beside_plant(motor, ride(motor, SECONDS), OWN)
     ms = 1000 * motor.period_s * np.arange(len(both.plant))
     drive, fault = drive_of("servo_24v"), FAULTS[0]
-    found = steady(drive, fault).observed
+    found = steady(drive, fault)[0].observed
     mean = np.hypot(*(found[f"residual_mean_{x}"] for x in "dq")) * 2.0**-LEAST.frac_bits * drive.bases.flux_wb
     volts, t = mean / drive.sample_time_s, 1000 * drive.sample_time_s * np.arange(len(mean))
     flag = np.flatnonzero(found["motor_differs"])

@@ -10,7 +10,7 @@ import numpy as np
 from cocotb_tests.support.host.rtl_board import RtlBoard
 from fluxproof.cosim.sleeping import with_sleep
 from fluxproof.hil.load import Word, load_words
-from fluxproof.plant import Inverter, Machine, Sensors
+from fluxproof.plant import Bus, Inverter, Machine, Sensors
 from golden_model.formats import MOTOR_SPEED
 from golden_model.io import motor_map
 from golden_model.io.register_map import OKAY
@@ -20,17 +20,18 @@ PACKET = 200  # clocks from a trigger in which the packet of its sample ends
 
 
 class HilBoard(RtlBoard):
-    """``machine``, ``inverter``, ``sensors``: of the motor; its registers are loaded over the bus at the start."""
+    """``machine``, ``inverter``, ``sensors``: of the motor, and its ``bus``, loaded at the start."""
 
     top = "fluxproof_hil"
     rewrite = staticmethod(with_sleep)
 
-    def __init__(self, drive, machine: Machine, inverter: Inverter, sensors: Sensors):
+    def __init__(self, drive, machine: Machine, inverter: Inverter, sensors: Sensors, bus: Bus):
         super().__init__(drive)
         self.map = motor_map.registers()
         self.stream: list[np.ndarray] = []  # words of the telemetry
+        self.buses: list[int] = []  # voltage of the bus, a value a period
         self.core.tick = self.listen
-        self.load(load_words(drive, machine, inverter, sensors))
+        self.load(load_words(drive, machine, inverter, sensors, bus))
         self.turn_rad_s = 2.0 * math.pi * drive.core.clock_hz / STEP * MOTOR_SPEED.lsb
 
     def load(self, words: list[Word]) -> None:
@@ -53,6 +54,7 @@ class HilBoard(RtlBoard):
 
     def run_period(self) -> None:
         self.speeds.append(self.value("motor_omega_m") * self.turn_rad_s)
+        self.buses.append(self.value("motor_u_bus"))
         self.listen(PACKET)
         spent = self.core.clock - self.began
         clocks, _, _ = self.core.run_period(self.limit)

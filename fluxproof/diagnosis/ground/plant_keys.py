@@ -55,6 +55,8 @@ OWN = {  # ranges that are neither the core's nor those of a unit
     "sensors.position_counts": Key("int", lo=0, hi=1 << 24),
     "sensors.seed": Key("int", lo=0, hi=(1 << 63) - 1),
     "machine.cogging_order": Key("int", lo=0, hi=100_000),
+    "machine.shorted_share": Key("float", "1", 0.0, 0.9),
+    "machine.shorted_phase": Key("int", lo=0, hi=2),
 }
 
 

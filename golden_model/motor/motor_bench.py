@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The motor with its bus as they are wired in rtl/motor/motor_bench.vhd, a step of STEP clocks at a time.
+
+The bus voltage that stands at a tick holds for the step that begins, also for the sensors; while the motor starts it
+is that of the source.  The charge of the step that
+ends, by the currents that stood at its tick, and the brake resistor at this tick change the voltage of the next one.
+"""
+
+from typing import NamedTuple
+
+from golden_model.kernel import kernel
+from golden_model.motor import motor_bus, motor_charge, motor_model
+
+bus_step, of_step, motor_step = motor_bus.step, motor_charge.of_step, motor_model.step
+Inputs, DROP_U = motor_model.Inputs, motor_bus.DROP_U
+
+
+class State(NamedTuple):
+    motor: motor_model.State = motor_model.State()
+    bus: motor_bus.State = motor_bus.State()
+    u_dc: int = 0  # since the last tick
+    u_dc_1: int = 0  # in the step before
+
+
+@kernel
+def step(state, inputs, brake, regs, of_bus, tables, clocks):
+    """One step: (state, what stands at the motor's outputs at its tick); ``inputs.u_dc`` is that of the source."""
+    x, before = inputs, state.motor.chain_4
+    start = 1 if x.start or state.motor.starting > 0 else 0
+    u_dc = x.u_dc if start else state.bus.u >> DROP_U
+    charge = (
+        of_step(x.high_a, x.low_a, before.i_a, clocks)
+        + of_step(x.high_b, x.low_b, before.i_b, clocks)
+        + of_step(x.high_c, x.low_c, before.i_c, clocks)
+    )
+    bus, _ = bus_step(
+        state.bus, charge, x.u_dc, brake, start, of_bus.inv_c, of_bus.k_source, of_bus.k_brake, of_bus.rectifier
+    )
+    now = Inputs(u_dc, x.load, x.start, x.high_a, x.low_a, x.high_b, x.low_b, x.high_c, x.low_c)
+    motor, shown = motor_step(state.motor, now, regs, tables, clocks)
+    return State(motor, bus, u_dc, state.u_dc), shown
