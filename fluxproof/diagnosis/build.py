@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from fluxproof.diagnosis.conventions.apply import read_drive
 from fluxproof.diagnosis.ground.nominal import Nominal
 from fluxproof.diagnosis.ground.result import Diagnosis, Digital, Fleet
-from fluxproof.diagnosis.physics import Explained, known_effects
+from fluxproof.diagnosis.physics import Outcome, known_effects
 from fluxproof.diagnosis.words.advice import advice
 from fluxproof.diagnosis.words.details import details
 from fluxproof.diagnosis.words.doubts import doubts
@@ -35,7 +35,7 @@ class Beside:
     worse: bool = False
 
 
-def build(found: Explained, nominal: Nominal, beside: Beside | None = None) -> Diagnosis:
+def build(found: Outcome, nominal: Nominal, beside: Beside | None = None) -> Diagnosis:
     """The diagnosis of recordings against a nominal drive."""
     decision, beside, effects = found.decision, beside or Beside(), known_effects()
     facts = Diagnosis(

@@ -35,7 +35,7 @@ from fluxproof.diagnosis.suspects import SUSPECTS
 
 
 @dataclass(frozen=True, eq=False)
-class Explained:
+class Outcome:
     """The decision on recordings of one drive, the points to record next, rows and findings of the recordings used."""
 
     decision: Decision
@@ -44,7 +44,7 @@ class Explained:
     problems: tuple[Problem, ...]
 
 
-def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: None, shifts=None) -> Explained:
+def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: None, shifts=None) -> Outcome:
     """Explain one recording, or several of the same drive, against a nominal drive.
 
     shifts: {effect: change of its log prior odds}.
@@ -53,15 +53,15 @@ def explain(loaded: list[Recording], nominal: Nominal, progress=lambda text: Non
     nominal, changed = as_read(loaded, nominal), loaded[0].meta.get("restated")
     used = sound(loaded, nominal, CATALOGUE)
     if any(r.fatal for r in used):
-        return explained(not_compared("bad_recording"), used)
+        return outcome(not_compared("bad_recording"), used)
     decision = restated(_decision(used, nominal, progress, shifts), changed)
-    return explained(decision, used, next_recording(decision, progress), little_used(used))
+    return outcome(decision, used, next_recording(decision, progress), little_used(used))
 
 
-def explained(decision: Decision, used: list[Recording], planned=(), more: tuple[Problem, ...] = ()) -> Explained:
+def outcome(decision: Decision, used: list[Recording], planned=(), more: tuple[Problem, ...] = ()) -> Outcome:
     """A decision on the recordings that were used; more: findings beside those of the checks."""
     problems = (*(p for r in used for p in r.problems), *more)
-    return Explained(decision, planned, sum(len(r) for r in used), problems)
+    return Outcome(decision, planned, sum(len(r) for r in used), problems)
 
 
 def known_effects() -> dict:

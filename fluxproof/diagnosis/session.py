@@ -41,7 +41,7 @@ from fluxproof.diagnosis.improve.untrimmed import given_trims, without_trims
 from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.loading.together import together as together_read
 from fluxproof.diagnosis.overlay.compare import closed_loop, is_worse
-from fluxproof.diagnosis.physics import Explained, explain, explained, known_effects
+from fluxproof.diagnosis.physics import Outcome, explain, known_effects, outcome
 from fluxproof.diagnosis.replay.digital import replay
 from fluxproof.diagnosis.replay.trims import as_ran
 from fluxproof.diagnosis.report import write_outputs
@@ -68,18 +68,18 @@ IMPROVED, ANSWER = "drive_improved.toml", "diagnosis.json"
 class Worked:
     """A diagnosis before its sentences: what the physics and the session found, and the drive it was found against."""
 
-    explained: Explained
+    outcome: Outcome
     beside: Beside
     nominal: Nominal
 
     @property
     def decision(self) -> Decision:
         """What was decided, and what it was decided from."""
-        return self.explained.decision
+        return self.outcome.decision
 
     def answer(self, *after: str, improved=True, worse=False) -> Diagnosis:
         """The diagnosis; after: notes on the written files; improved, worse: as in Beside."""
-        return build(self.explained, self.nominal, replace(self.beside, after=after, improved=improved, worse=worse))
+        return build(self.outcome, self.nominal, replace(self.beside, after=after, improved=improved, worse=worse))
 
 
 def diagnose(recordings, drive, progress=lambda text: None, prior=None) -> Diagnosis:
@@ -174,7 +174,7 @@ def _worked(loaded, nominal, progress, fleet=None) -> Worked:
     digital, notes = _digital(loaded, progress)
     nominal, differ = as_ran(nominal, loaded)
     if digital.first_difference is not None:
-        found = explained(not_compared("digital_mismatch"), loaded)
+        found = outcome(not_compared("digital_mismatch"), loaded)
     else:
         found = _physics(loaded, nominal, progress, prior.shifts() if prior else None)
     placed = None
@@ -213,7 +213,7 @@ def _keep_inputs(out: Path, nominal: Nominal, read: list) -> None:
         raise DriveError(f"{chart}: no diagnosis wrote this, and it would be overwritten; choose another folder")
 
 
-def _physics(loaded, nominal, progress, shifts) -> Explained:
+def _physics(loaded, nominal, progress, shifts) -> Outcome:
     """The decision of physics.py; a recording without a usable operating point is a bad recording."""
     try:
         return explain(loaded, nominal, progress, shifts)
@@ -221,7 +221,7 @@ def _physics(loaded, nominal, progress, shifts) -> Explained:
         problem = Problem("no_balance", str(error), fatal=True)
         # The reason of a part that was left out is a finding of another one (balance/parts.py).
         used = [recording for recording in loaded if not recording.fatal]
-        return explained(not_compared("bad_recording"), used, more=(problem,))
+        return outcome(not_compared("bad_recording"), used, more=(problem,))
 
 
 def _digital(loaded, progress) -> tuple[Digital, list[str]]:
