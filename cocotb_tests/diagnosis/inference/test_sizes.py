@@ -18,10 +18,12 @@ from fluxproof.diagnosis.inference.setup import Setup
 PSI, L_Q = NOMINAL.machine.magnet_flux_wb, NOMINAL.machine.inductance_q_h
 
 
-def test_absurd_sizes_are_impossible():
-    view = slow_view(log(Truth(l_q=12.0 * L_Q)), NOMINAL)
+@pytest.mark.parametrize("times, is_possible", [(5.0, True), (12.0, False)])
+def test_absurd_sizes_are_impossible(times, is_possible):
+    """What a drive file has at a fifth was impossible, and a bus sensor 127 % off was named in its place."""
+    view = slow_view(log(Truth(l_q=times * L_Q)), NOMINAL)
     alone = fit_set(Problem(Setup(view, view.visible(CATALOGUE), np.ones(len(view), bool))), ("inductance_q",))
-    assert not possible(alone)
+    assert possible(alone) is is_possible
 
 
 def test_of_forms_that_exclude_each_other_a_possible_one_is_taken(monkeypatch):
