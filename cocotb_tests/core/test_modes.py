@@ -22,7 +22,7 @@ def step_of(drive, before, after):
     scenario, values, at = modes.change(drive, before, after)
     run = figures.play(drive, scenario, **values)
     assert not np.any(run.observed["sample_trip"])
-    return modes.steps(drive, run.observed, at)[0] / CIRCLE
+    return modes.step_of(drive, run.observed, at)
 
 
 @pytest.mark.parametrize(
@@ -30,7 +30,7 @@ def step_of(drive, before, after):
 )
 def test_a_change_makes_no_step_of_the_voltage(pair):
     """Under half the rated load, with references that are far from what is there."""
-    assert step_of(DRIVE, *pair) < 0.04
+    assert step_of(DRIVE, *pair) < modes.TARGET
 
 
 def test_without_the_block_a_change_makes_a_step():
@@ -43,9 +43,8 @@ def test_within_a_mode_every_bit_is_as_without_the_block():
     chosen = registers(DRIVE)
     plain = chosen._replace(config=chosen.config._replace(modes=0))
     scenario = moves(DRIVE, 0.03, {})
-    scenario.changes[0]["position_mode"] = 0
     torque = np.where(np.arange(len(scenario)) % 100 < 50, 20000, -9000)
-    scenario = dataclasses.replace(scenario, i_q_ext=torque)
+    scenario = dataclasses.replace(scenario, i_q_ext=torque, changes={})
     one, other = (figures.simulate(DRIVE, s, scenario).observed for s in (chosen, plain))
     assert all(np.array_equal(one[name], other[name]) for name in one)
 
@@ -55,9 +54,8 @@ def test_voltage_mode_gives_the_voltage_within_the_circle():
     drive = modes.with_modes(positioned("paper001"))
     chosen = registers(drive).values
     n, target = 800, 20000
-    scenario = moves(drive, n * drive.sample_time_s, {})
-    scenario.changes[0] |= {"position_mode": 0, "voltage_mode": 1, "u_q_ext": target}
-    scenario.changes[n // 2] = {"u_q_ext": 131071}
+    changes = {0: {"voltage_mode": 1, "u_q_ext": target}, n // 2: {"u_q_ext": 131071}}
+    scenario = dataclasses.replace(moves(drive, n * drive.sample_time_s, {}), changes=changes)
     observed = figures.play(drive, scenario, compensate=0).observed
     asked = np.minimum(np.arange(n // 2) * chosen.u_step, target)
     assert np.array_equal(np.asarray(observed["u_q"])[: n // 2], asked)

@@ -31,7 +31,7 @@ def rtl() -> Iterator[dict]:
 def main() -> int:
     """All figures; exit status 1 where one misses its target."""
     rows = []
-    changes = (one for name in figures.CASES for one in modes.rows_of(name))
+    changes = (one for built in (True, False) for name in figures.CASES for one in modes.rows_of(name, built))
     for found in (figures.all_figures(), changes, rtl()):
         for one in found:
             rows.append(one)

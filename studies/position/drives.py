@@ -31,15 +31,15 @@ def positioned(name: str, machine: Mapping | None = None, **position):
 def moves(drive, seconds: float, targets: Mapping[float, float], changes: Mapping[float, Mapping] | None = None):
     """Position mode from the start: ``targets`` {time [s]: angle of the shaft [rad]}; ``changes`` {time: registers}."""
     n, t_s = round(seconds / drive.sample_time_s), drive.sample_time_s
-    zeros = np.zeros(n, np.int64)
+    zeros = np.zeros((4, n), np.int64)  # an array each: a scene may be written into
     found: dict[int, dict[str, int]] = {0: {"position_mode": 1}}
     for time, angle in targets.items():
         found.setdefault(round(time / t_s), {})["position_target"] = to_position(angle)
     for time, given in (changes or {}).items():
         found.setdefault(round(time / t_s), {}).update(given)
     return Scenario(
-        omega_ref=zeros, load=np.zeros(n), u_dc=np.full(n, drive.inverter.dc_bus_v), i_d_ref=zeros, i_q_ext=zeros,
-        speed_mode=zeros, enable=np.ones(n, np.int64), changes=dict(sorted(found.items())),
+        omega_ref=zeros[0], load=np.zeros(n), u_dc=np.full(n, drive.inverter.dc_bus_v), i_d_ref=zeros[1],
+        i_q_ext=zeros[2], speed_mode=zeros[3], enable=np.ones(n, np.int64), changes=dict(sorted(found.items())),
     )  # fmt: skip
 
 

@@ -111,10 +111,8 @@ def between_modes(name: str) -> list[dict]:
     drive = case(name)
     speed = 0.5 * limits(drive)[0]
     t_s, change, back = drive.sample_time_s, 0.3, 0.5
-    scenario = moves(
-        drive, 0.6, {}, {change: {"position_mode": 1, "position_target": POSITION.hi}, back: {"position_mode": 0}}
-    )
-    scenario.changes[0]["position_mode"] = 0
+    position, other = {"position_mode": 1, "position_target": POSITION.hi}, {"position_mode": 0}
+    scenario = moves(drive, 0.6, {}, {0.0: other, change: position, back: other})
     reference = from_si("omega_ref", speed * drive.machine.pole_pairs, drive)
     ones = np.ones(len(scenario), np.int64)
     scenario = dataclasses.replace(scenario, speed_mode=ones, omega_ref=reference * ones)
