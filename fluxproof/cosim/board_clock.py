@@ -133,8 +133,9 @@ def core_clock(state, inputs, regs, irq, ways, carrier_half, trip_filter):
     """
     w, i = state.wires, inputs
     stop, clear_trip, pin = ways
+    core_trip = 1 if stop or state.trip_2 else 0
     now = clocked.Inputs(
-        sample_valid=w.sample_valid, enable=i.enable, trip=1 if stop or state.trip_2 else 0,
+        sample_valid=w.sample_valid, enable=i.enable, trip=core_trip,
         clear_trip=clear_trip, host_write=i.host_write, sample_faults=i.sample_faults, sample_trip=i.sample_trip,
         current_offset=i.current_offset, motion_faults=i.motion_faults, open_load=i.open_load,
         encoder_lost=i.encoder_lost, motor_differs=i.motor_differs,
