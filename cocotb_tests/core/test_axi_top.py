@@ -4,10 +4,14 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 
 import numpy as np
 
 from cocotb_tests.support.drives import PAPER
+from fluxproof.checkout import ROOT
 from fluxproof.cosim import ghdl
 
 CARRIER_HALF, CLOCK_HZ = 72, 1_440_000
@@ -30,3 +34,13 @@ def test_motor_spins_over_the_registers():
     # A model of nonsense could be bit-exact too: the motor must have turned.
     motion = np.load(folder / "result.npz")
     assert motion["omega_m"].max() > 15 and motion["omega_m"][-1] < motion["omega_m"].max() - 10
+
+
+def test_the_golden_top_is_the_golden_core_a_clock_later():
+    """The model that `make rough` and `make mutate` hold against fluxproof_axi; without numba, which takes longer."""
+    command = [sys.executable, "-m", "cocotb_tests.support.core.axi_beside_core", "350"]
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["different"] == told["on_after"] == 0 and told["on_before"] > 100

@@ -125,6 +125,38 @@ class BoardRegisters(NamedTuple):
 
 
 @kernel
+def core_clock(state, inputs, regs, irq, ways, carrier_half, trip_filter):
+    """A clock of core, interrupts and power stage, whose samples enter by ``state.wires.sample_valid``.
+
+    ``irq``: (irq_mask, irq_clear); ``ways`` to the gates: (stop by the board, clear_trip, pin trip).
+    Returns (core, interrupts, (filter, caught, trip_1), whether a sample has entered, what the core shows, irq, off).
+    """
+    w, i = state.wires, inputs
+    stop, clear_trip, pin = ways
+    core_trip = 1 if stop or state.trip_2 else 0
+    now = clocked.Inputs(
+        sample_valid=w.sample_valid, enable=i.enable, trip=core_trip,
+        clear_trip=clear_trip, host_write=i.host_write, sample_faults=i.sample_faults, sample_trip=i.sample_trip,
+        current_offset=i.current_offset, motion_faults=i.motion_faults, open_load=i.open_load,
+        encoder_lost=i.encoder_lost, motor_differs=i.motor_differs,
+        brake_asked=i.brake_asked, compare_a=i.compare_a, compare_b=i.compare_b, compare_c=i.compare_c,
+    )  # fmt: skip
+    core, entered, seen = clocked.step(state.of_core, now, regs, carrier_half)
+    causes, (_, line) = interrupts_step(
+        state.of_interrupts, w.tripped, w.fault_flags, w.setting_refused, w.running, i.motor_differs, irq[0], irq[1]
+    )
+    # The power stage: a trip is caught without a clock, and let go when the core has it
+    of_filter, trip_on, trip_next = state.of_filter, pin, pin
+    if trip_filter:  # its level changes with the clock: the gates go off behind this edge
+        trip_on = state.of_filter.level
+        of_filter, (trip_next, _) = filter_step(state.of_filter, pin, trip_filter)
+    caught = 1 if trip_on or state.caught else 0
+    kept = 1 if trip_on or trip_next or (caught and not state.trip_2) else 0
+    off = 1 if caught or trip_next else 0
+    return core, causes, (of_filter, kept, caught), entered, seen, line, off
+
+
+@kernel
 def one_clock(state, inputs, regs, b, pins, carrier_half, config):
     """One clock: (next state, whether a sample has entered, core, position, converters, board, snapshot, gates off)."""
     w, p, c = state.wires, pins, AT_CONVERTERS
@@ -165,25 +197,10 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
         state.of_snapshot, w.sample_valid, b.take_snapshot, w.encoder_code, w.position_code, w.encoder_count,
         w.encoder_flags, w.adc_a, w.adc_b, w.adc_c, w.adc_u_dc, adc_bits, position_bits,
     )  # fmt: skip
-    i, core_trip = inputs, 1 if w.board_stop or state.trip_2 else 0
-    now = clocked.Inputs(
-        sample_valid=w.sample_valid, enable=i.enable, trip=core_trip,
-        clear_trip=w.core_clear, host_write=i.host_write, sample_faults=i.sample_faults, sample_trip=i.sample_trip,
-        current_offset=i.current_offset, motion_faults=i.motion_faults, open_load=i.open_load,
-        encoder_lost=i.encoder_lost, motor_differs=i.motor_differs,
-        brake_asked=i.brake_asked, compare_a=i.compare_a, compare_b=i.compare_b, compare_c=i.compare_c,
+    core, causes, stage, entered, seen_core, irq, off = core_clock(
+        state, inputs, regs, (b.irq_mask, b.irq_clear), (w.board_stop, w.core_clear, p[AT_TRIP]), carrier_half,
+        trip_filter,
     )  # fmt: skip
-    core, entered, seen_core = clocked.step(state.of_core, now, regs, carrier_half)
-    causes, (_, irq) = interrupts_step(
-        state.of_interrupts,
-        w.tripped,
-        w.fault_flags,
-        w.setting_refused,
-        w.running,
-        i.motor_differs,
-        b.irq_mask,
-        b.irq_clear,
-    )
     x, y, z = seen_position, seen_converters, seen_core
     wires = Wires(
         trigger=z.sample_trigger,
@@ -218,14 +235,6 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
         setting_refused=z.setting_refused,
         irq=irq,
     )
-    # The power stage: a trip is caught without a clock, and let go when the core has it
-    of_filter, trip_on, trip_next = state.of_filter, p[AT_TRIP], p[AT_TRIP]
-    if trip_filter:  # its level changes with the clock: the gates go off behind this edge
-        trip_on = state.of_filter.level
-        of_filter, (trip_next, _) = filter_step(state.of_filter, p[AT_TRIP], trip_filter)
-    caught = 1 if trip_on or state.caught else 0
-    kept = 1 if trip_on or trip_next or (caught and not state.trip_2) else 0
-    off = 1 if caught or trip_next else 0
     following = State(
         of_core=core,
         of_position=position,
@@ -235,9 +244,9 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
         of_faults=faults,
         of_snapshot=snapshot,
         of_interrupts=causes,
-        of_filter=of_filter,
-        caught=kept,
-        trip_1=caught,
+        of_filter=stage[0],
+        caught=stage[1],
+        trip_1=stage[2],
         trip_2=state.trip_1,
         wires=wires,
     )
@@ -297,8 +306,11 @@ class GoldenBlocks:
 class BoardClock:
     """One golden board after its reset; ``clock`` counts from the first clock without reset inside."""
 
+    seen_names: tuple[str, ...] = SEEN
+    status_names: tuple[str, ...] = STATUS
+
     def __init__(self, blocks: GoldenBlocks, clock_hz: int):
-        self.blocks, core = blocks, blocks.core
+        self.blocks, self.clock_hz, core = blocks, clock_hz, blocks.core
         generics = {**core._asdict(), "clock_hz": clock_hz}
         self.registers = RegisterFile(generics)
         self.registers.map = board_map.registers()
@@ -312,6 +324,7 @@ class BoardClock:
         self.observed: fluxproof.Observed | None = None
         self.samples = 0
         self.history: list[tuple[fluxproof.Sample, fluxproof.Observed]] = []  # of the samples
+        self.strobes: list[int] = []  # the clocks at which they entered
         self._due: list[tuple[int, dict[str, int]]] = []
         self._writes: list[tuple[int, str, int]] = []
         self._taken: list[tuple[int, str, int]] = []  # registers that change, and host_write with them
@@ -324,18 +337,15 @@ class BoardClock:
 
     def advance(self, pins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A clock for each row of ``pins`` (columns PINS): (rows of SEEN, rows of STATUS), as each clock left them."""
-        seen = np.zeros((len(pins), len(SEEN)), np.int64)
-        status = np.zeros((len(pins), len(STATUS)), np.int64)
+        seen = np.zeros((len(pins), len(self.seen_names)), np.int64)
+        status = np.zeros((len(pins), len(self.status_names)), np.int64)
         at = 0
         while at < len(pins):
             waits = self._take_writes()
             stops = [when - self.clock for when, *_ in (*self._due, *self._writes, *self._taken) if when > self.clock]
             length = min([len(pins) - at, *stops])
             part = slice(at, at + length)
-            self.state, made, entered, wires = run_clocks(
-                self.state, self.inputs, self._settings(), self._board(), pins[part], self.blocks.core.carrier_half,
-                self.config, waits, seen[part], status[part],
-            )  # fmt: skip
+            self.state, made, entered, wires = self._run(pins[part], waits, seen[part], status[part])
             references = [self.registers.values[name] for name in REFERENCES]
             self.clock += made
             at += made
@@ -343,6 +353,13 @@ class BoardClock:
             if entered:
                 self._enter(wires, references)
         return seen, status
+
+    def _run(self, pins: np.ndarray, waits: bool, seen: np.ndarray, status: np.ndarray):
+        """Clocks as in ``run_clocks``."""
+        return run_clocks(
+            self.state, self.inputs, self._settings(), self._board(), pins, self.blocks.core.carrier_half,
+            self.config, waits, seen, status,
+        )  # fmt: skip
 
     def _settings(self) -> fluxproof.Registers:
         return self.registers.settings()
@@ -403,7 +420,8 @@ class BoardClock:
         )
         self.of_samples, observed = fluxproof.step(self.of_samples, sample, registers, self.blocks.core)
         self.observed = observed
-        del self.history[self.samples - 1 :]  # of a clock that is made again
+        del self.history[self.samples - 1 :], self.strobes[self.samples - 1 :]  # of a clock that is made again
+        self.strobes.append(self.clock - 1)
         self.history.append((sample, observed))
         for after, names in clocked.DUE.values():
             self._due.append((self.clock - 1 + after, {name: getattr(observed, name) for name in names}))

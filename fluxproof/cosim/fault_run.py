@@ -158,18 +158,22 @@ class FaultRun:
         return [] if batch or k < self.settled else [*WATCHED, *WATCHED][turn : turn + self.per_period]
 
     def _words(self) -> dict[str, int]:
-        """What a read of each register would answer now, of those that the golden board knows."""
-        file, latch = self.golden.registers, self.golden.state.of_core.of_fault_latch
-        known = self.shown | {"fault_flags": latch.flags, "first_fault": latch.first}
-        known["irq_cause"] = self.golden.state.of_interrupts.causes
-        if self.golden.observed is not None:
-            known |= self.golden.observed._asdict()
-        file.status |= known
-        return {
-            name: file.read(register.address)[1]
-            for name, register in file.map.items()
-            if register.kind in (Kind.SETTING, Kind.COMMAND) or all(field.name in known for field in register.fields)
-        }
+        return words(self.golden, self.shown)
+
+
+def words(golden: BoardClock, shown: dict[str, int]) -> dict[str, int]:
+    """What a read of each register would answer now, of those that the golden top knows; ``shown``: its STATUS."""
+    file, latch = golden.registers, golden.state.of_core.of_fault_latch
+    known = shown | {"fault_flags": latch.flags, "first_fault": latch.first}
+    known["irq_cause"] = golden.state.of_interrupts.causes
+    if golden.observed is not None:
+        known |= golden.observed._asdict()
+    file.status |= known
+    return {
+        name: file.read(register.address)[1]
+        for name, register in file.map.items()
+        if register.kind in (Kind.SETTING, Kind.COMMAND) or all(field.name in known for field in register.fields)
+    }
 
 
 STARTED = {0: {"irq_clear": 15, "clear_trip": 1}, 1: {"enable": 1}, 2: {"i_q_ext": CURRENT}}

@@ -19,16 +19,18 @@ from datetime import date
 from fluxproof.cosim.verilog import NoUsableGhdl, find_ghdl
 from fluxproof.files import write_json
 from scripts.mutate import defects
+from scripts.mutate.axi import TOP as AXI
 from scripts.mutate.board import RUNS
 from scripts.mutate.board import TOP as BOARD
 from scripts.mutate.equivalent import DIFFERENT, EQUIVALENT, UNKNOWN
 from scripts.mutate.judge import KILLED, Verdicts, judge, processor_s
-from scripts.mutate.subject import FOLDER, Board, Core, Subject, subjects
+from scripts.mutate.subject import FOLDER, Axi, Board, Core, Subject, subjects
 from scripts.mutate.table import reason
 
 ENOUGH = 0.995  # of those not proved equivalent
-# Of the board's wiring nothing is proved equivalent: it has a share of its own, which may only rise.
+# Of the tops' wiring nothing is proved equivalent: it has a share of its own, which may only rise.
 ENOUGH_OF_BOARD = 0.97
+TOPS = (BOARD, AXI)
 COUNTED = ("mutants", "killed", "equivalent", "survivors", "without_reason")
 
 
@@ -85,14 +87,14 @@ def line_of(verdicts: Verdicts) -> str:
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="mutate", description=__doc__.splitlines()[0])
-    only_says = "these blocks alone, with commas between; fluxproof is the core's wiring, fluxproof_board the board's"
+    only_says = "these alone; fluxproof is the core's wiring, fluxproof_board and fluxproof_axi the tops'"
     parser.add_argument("--only", default="", metavar="BLOCKS", help=only_says)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="subjects in parallel")
     parser.add_argument("--seed", type=int, default=seed_of(date.today()), help="of the draw; default the date")
     arguments = parser.parse_args()
     print(f"seed {arguments.seed}", flush=True)
     only = set(filter(None, arguments.only.split(",")))
-    everything: list[Subject | Core | Board] = [Core(), *(Board(k) for k in range(len(RUNS))), *subjects()]
+    everything: list[Subject | Core | Board] = [Core(), *(Board(k) for k in range(len(RUNS))), Axi(), *subjects()]
     chosen = [s for s in everything if not only or s.of in only]
     if wrong := only - {s.of for s in chosen}:
         parser.error(f"--only: no block {', '.join(sorted(wrong))}")
@@ -123,8 +125,8 @@ def main() -> int:
                 print(f"{said} rtl/{defect.file}: {defect.says}", flush=True)
                 unnoticed += [defect.says] * (said == "SURVIVED")
     seconds = time.monotonic() - began
-    wiring = summary([v for v in found if block_of(v) == BOARD], arguments.seed, seconds)
-    result = summary([v for v in found if block_of(v) != BOARD], arguments.seed, seconds) | {"board": wiring}
+    wiring = summary([v for v in found if block_of(v) in TOPS], arguments.seed, seconds)
+    result = summary([v for v in found if block_of(v) not in TOPS], arguments.seed, seconds) | {"board": wiring}
     result["failed"] = failed
     result["defects"] = {"planted": 0 if arguments.only else len(defects.DEFECTS), "unnoticed": unnoticed}
     write_json(FOLDER / ("some.json" if arguments.only else "result.json"), result)
@@ -137,7 +139,7 @@ def main() -> int:
     )
     if wiring["mutants"]:
         print(
-            f"wiring of the board: {wiring['killed']} of {wiring['mutants']} noticed, {100 * share(wiring):.1f} %; at "
+            f"wiring of the tops: {wiring['killed']} of {wiring['mutants']} noticed, {100 * share(wiring):.1f} %; at "
             f"least {100 * ENOUGH_OF_BOARD:.0f} %, what is left is in the result"
         )
     for name, why in failed.items():

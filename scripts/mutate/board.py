@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from fluxproof.cosim.board_clock import SEEN
-from fluxproof.cosim.fault_run import FaultRun, edges_run, serial_run
+from fluxproof.cosim.fault_run import Chunk, FaultRun, edges_run, serial_run
 from fluxproof.cosim.verilog import VerilogPort
 from scripts.mutate.harness import Trial
 
@@ -58,17 +58,22 @@ def no_change(index: int) -> re.Pattern[str]:
 
 def trial(run: FaultRun, ports: Iterable[VerilogPort]) -> Trial:
     """The run as a schedule for the ports of the converted top."""
+    return schedule(run.run(run.with_reads), ports, SEEN)
+
+
+def schedule(chunks: Iterable[Chunk], ports: Iterable[VerilogPort], seen: tuple[str, ...]) -> Trial:
+    """Chunks, whose columns are ``seen``, as a schedule for the ports of a converted top."""
     ports = tuple(ports)
     number = {p.name: k for k, p in enumerate(ports)}
     writes = [(-IN_RESET, number[name], value) for name, value in CONSTANT.items()]
     writes.append((-2, number["aresetn"], 1))
     checks, held, at = [], {}, 0
-    for chunk in run.run(run.with_reads):
+    for chunk in chunks:
         for name, values in chunk.inputs.items():
             for k in np.flatnonzero(np.diff(values, prepend=held.get(name, 0))):
                 writes.append((at + int(k), number[name], int(values[k])))
             held[name] = int(values[-1])
-        for name, column in zip(SEEN, chunk.seen.T, strict=True):
+        for name, column in zip(seen, chunk.seen.T, strict=True):
             checks += [(at + 1 + k, number[name], int(value)) for k, value in enumerate(column)]
         for k, word in chunk.reads:
             checks.append((at + k + ANSWER, number["s_axi_rvalid"], 1))

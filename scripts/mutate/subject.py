@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is mutated: each block of the registry with each of its configurations, the wiring of the core and the board."""
+"""What is mutated: each block of the registry with each of its configurations, the wiring of the core and both tops."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fluxproof.cosim.sources import rtl_sources
 from fluxproof.cosim.verilog import TOP, sources_of, synthesize, top_ports
 from golden_model.block import Block
 from golden_model.registry import BLOCKS
-from scripts.mutate import board, core
+from scripts.mutate import axi, board, core
 from scripts.mutate.harness import BENCH_SEED, Trial, block_trial
 
 FOLDER = BUILD / "mutate"
@@ -150,6 +150,31 @@ class Board:
         """Its run through the pins."""
         ports = top_ports(self.folder / "design.v", top=self.top)
         return [board.trial(board.RUNS[self.index](), ports)]
+
+
+@dataclass(frozen=True)
+class Axi(Board):
+    """The own cells and connections of fluxproof_axi."""
+
+    index: int = 0
+    of: str = axi.TOP
+
+    @property
+    def no_change(self) -> re.Pattern[str]:
+        return axi.NO_CHANGE
+
+    @property
+    def top(self) -> str:
+        return axi.TOP
+
+    def verilog(self) -> str:
+        return synthesize(sources_of(self.top), self.top, axi.clock()[1].generics())
+
+    def count(self, cells: int) -> int:
+        return axi.DRAWN
+
+    def trials(self) -> list[Trial]:
+        return [axi.trial(top_ports(self.folder / "design.v", top=self.top))]
 
 
 def subjects(only: str = "") -> list[Subject]:

@@ -7,10 +7,12 @@ Encoders with a clock of their own become a code from elsewhere (golden_model.dr
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import ClassVar
 
 import numpy as np
 
+from fluxproof.cosim.axi_clock import Write
 from fluxproof.cosim.board_clock import PINS, SEEN, BoardClock, GoldenBlocks
 from fluxproof.cosim.driven_plant import build_plant
 from fluxproof.plant import sensor_params
@@ -21,6 +23,7 @@ from golden_model.drive_keys import needed
 from golden_model.io import board_faults, fault_latch
 from golden_model.registers import registers
 from golden_model.units import TURN_RAD, from_si
+from studies.rough.rtl import Beside
 
 CODES_AT = 60  # clock of a period at which the codes are there
 SLOT = 70  # clocks between two writes
@@ -29,7 +32,12 @@ TURN_BITS = {"pin_a": (1.0, 2.0), "pin_b": (2.0, 2.0)}  # count at which the lin
 
 
 class RoughBoard:
-    """``spoil(pins, board)`` changes the pins of a period in place; ``faults`` are those that tripped first."""
+    """``spoil(pins, board)`` changes the pins of a period in place; ``faults`` are those that tripped first.
+
+    ``watched``: with each board goes its RTL, added to this list.
+    """
+
+    watched: ClassVar[list[Beside] | None] = None
 
     def __init__(self, drive: Drive, theta_m: float = 0.0, omega_m: float = 0.0):
         self.drive, self.clock_hz = drive, round(drive.core.clock_hz)
@@ -42,6 +50,9 @@ class RoughBoard:
         self.spoil: Callable[[dict, RoughBoard], None] = lambda pins, board: None
         self.peak_a, self.gates_on, self.farthest = 0.0, 0, [0.0, 0.0]
         self.fault_period: int | None = None
+        self.rtl = None if self.watched is None else Beside(self.golden)
+        if self.watched is not None and self.rtl is not None:
+            self.watched.append(self.rtl)
         lead = BoardClock(blocks, self.clock_hz).advance(np.zeros((4 * self.length, len(PINS)), np.int64))[0]
         self._clocks(int(np.flatnonzero(lead[:, SEEN.index("sample_trigger")])[0]) + 1)
         self.load(board_registers(drive))
@@ -56,10 +67,11 @@ class RoughBoard:
 
     def run(self, periods: int, **writes: int) -> None:
         """Periods of PWM, the writes at the begin of the first."""
-        for n, (name, value) in enumerate(writes.items()):
-            self.golden.write(name, value, self.golden.clock + n * SLOT)
-        for _ in range(periods):
-            self._clocks(self.length)
+        batch = [Write(n * SLOT, name, value) for n, (name, value) in enumerate(writes.items())]
+        for at, name, value in batch:
+            self.golden.write(name, value, self.golden.clock + at)
+        for k in range(periods):
+            self._clocks(self.length, [] if k else batch)
             if self.fault_period is None and self.faults:
                 self.fault_period = self.period
             self.period += 1
@@ -100,7 +112,7 @@ class RoughBoard:
 
     # ---------------------------------------------------------------- clocks
 
-    def _clocks(self, length: int) -> None:
+    def _clocks(self, length: int, writes: Sequence[Write] = ()) -> None:
         omega, theta = float(self.plant.omega_m), float(self.plant.theta_m)
         angle = self.place + theta + omega * np.arange(length) / self.clock_hz
         pins = {name: np.zeros(length, np.int64) for name in PINS}
@@ -112,6 +124,8 @@ class RoughBoard:
         pins["code_u_dc_in"][:] = u_dc_code(self.codes, self.drive.inverter.dc_bus_v, 0)
         self.spoil(pins, self)
         seen, _ = self.golden.advance(np.stack([pins[n] for n in PINS], axis=1))
+        if self.rtl is not None:
+            self.rtl.period(pins, writes, seen)
         words = seen[:, SEEN.index("gate_high")] + 8 * seen[:, SEEN.index("gate_low")]
         self.gates_on += int(np.count_nonzero(words))
         at = np.flatnonzero(np.diff(words, prepend=-1))

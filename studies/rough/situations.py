@@ -12,10 +12,15 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from fluxproof.checkout import DRIVES
+from fluxproof.cosim.axi_clock import writes_in
+from fluxproof.cosim.board_clock import PINS
+from fluxproof.cosim.fault_run import FaultRun, edges_run, serial_run
 from golden_model.drive import Drive, load, with_carrier
 from golden_model.drive_keys import needed
+from golden_model.io import board_faults, fault_latch
 from golden_model.registers import registers
 from studies.rough.board import RoughBoard
+from studies.rough.rtl import Beside
 
 CARRIER_HALF = 250
 PEAK, WRONG_WAY_DEG = 1.5, 10.0  # of the current limit; of the shaft against the direction
@@ -25,6 +30,7 @@ HALLS = ("hub_36v",)
 SPEEDS = (0.03, 0.1, 0.3, 0.8)
 ALLOWED_S = {0.03: 0.05, 0.1: 0.005, 0.3: 0.005, 0.8: 0.005}  # until a lost encoder is named
 HALL_ALLOWED_S = 0.1  # an edge tells the speed
+SILENT = 20  # periods without a write
 UNSEEN_ALLOWED_S = 0.15  # the same where emf_check cannot see the EMF: stall_s, and the way to the current limit
 
 
@@ -222,6 +228,36 @@ def trip_and_clear(drive: Drive, _part: float) -> tuple[str, bool]:
     return f"{unseen} of 12 trips cleared unseen", ran and unseen == 0 and not board.tripped
 
 
+def silent_host(drive: Drive, part: float) -> tuple[str, bool]:
+    """The host writes once more and then no longer than the heartbeat; it is named, and the gates go off."""
+    board = running(drive, part)
+    board.run(1, heartbeat=SILENT)
+    board.run_s(0.0, clear_encoder=0)
+    early, since = board.tripped, board.period - 1
+    board.run(2 * SILENT)
+    seen, good = verdict(board, ("host_lost",), (SILENT + 2) * drive.sample_time_s, since)
+    return seen, good and not early
+
+
+def scripted(make: Callable[[], FaultRun], names: frozenset[str]):
+    """The script of fluxproof/cosim/fault_run.py, without a motor: all of these faults trip in their turn."""
+
+    def play(_drive: Drive, _part: float) -> tuple[str, bool]:
+        run, found = make(), set()
+        rtl = None if RoughBoard.watched is None else Beside(run.golden)
+        if RoughBoard.watched is not None and rtl is not None:
+            RoughBoard.watched.append(rtl)
+        for chunk in run.run(run.periods):
+            if rtl is not None:
+                rtl.period({name: chunk.inputs[name] for name in PINS}, writes_in(chunk.inputs), chunk.seen)
+            state = run.golden.state
+            for of, first in ((board_faults, state.of_faults.first), (fault_latch, state.of_core.of_fault_latch.first)):
+                found |= {name for k, name in enumerate(of.NAMES) if first >> k & 1}
+        return ", ".join(sorted(found)), names <= found
+
+    return play
+
+
 ALL = (*EDGES, *HALLS, *ABSOLUTE)
 LOST = ("encoder_lost", "position")
 NAMED = "encoder_lost or position in 5 ms, in 50 ms at 3 %; where emf_check cannot see the EMF: or stall in 150 ms, or"
@@ -243,6 +279,21 @@ TABLE = (
     Situation("one Hall sensor at 0", "hall_code", HALLS, (0.25, 0.8), hall_levels((0, None, None), True)),
     Situation("one Hall sensor at 1", "hall_code", HALLS, (0.25, 0.8), hall_levels((None, 1, None), True)),
     Situation("a trip at a write of clear_trip", "stays off", ("servo_24v", "spindle_400v"), (0.0,), trip_and_clear),
+    Situation(
+        "a script: SSI encoder silent, fast overcurrent, host, trip",
+        "each named",
+        ("spindle_400v",),
+        (0.0,),
+        scripted(serial_run, frozenset(("position_lost", "converter_over", "host_lost", "trip"))),
+    ),
+    Situation(
+        "a script: index lost and wrong, host, trip",
+        "each named",
+        ("servo_24v",),
+        (0.0,),
+        scripted(edges_run, frozenset(("no_index", "index_wrong", "host_lost", "trip"))),
+    ),
+    Situation("the host is silent", "host_lost in the heartbeat's time", ALL, (0.3,), silent_host),
 )
 PASSES = {"enabled before the index": 2, "index dead, two turns by hand": 2, "Z stuck at 1, two turns by hand": 2,
           "spike of 300 ns on Z at rest": 2, "index met twice": 2}  # fmt: skip
