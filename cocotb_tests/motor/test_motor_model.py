@@ -19,7 +19,7 @@ from golden_model.fixed import round_half_up
 from golden_model.formats import FLUX, MOTOR_FLUX, MOTOR_LEG, MOTOR_VOLTAGE, PU
 from golden_model.motor import motor_bus, motor_flux, motor_legs, motor_model, motor_shaft
 from golden_model.motor.motor_model import Shown
-from studies.hil import closed_loop, equal, golden, residual
+from studies.hil import closed_loop, commissioning, equal, golden, residual
 from studies.hil.beside_plant import HELD, OWN, beside_plant, follow
 from studies.hil.drive import CLOCK_HZ, CURRENT_A, SERVO, SWITCHES, U_DC_V, ride, servo
 from studies.hil.plant import ANGLE_DEG, CURRENT_PERCENT, TORQUE_PERCENT, differences
@@ -72,6 +72,14 @@ def test_compiled_loop_is_the_clocked_one():
     for k, row in enumerate(clocked):
         assert row == {name: int(values[k]) for name, values in observed.items()}, f"sample {k}"
     assert len(clocked) == periods - 1 and abs(clocked[-1]["omega_me"]) > 1000
+
+
+@pytest.mark.slow
+def test_commissioning_measures_the_motor_of_the_fpga():
+    """All steps on core and motor as models, from a wrong file; each value beside what the motor's registers say."""
+    found = commissioning.measured(commissioning.bench())
+    assert len(found.said) == 8 and abs(found.angle_deg) < 0.1
+    assert all(abs(found.errors[name]) < most for name, most in commissioning.TARGETS.items()), found.errors
 
 
 @pytest.mark.parametrize("how", [HELD, OWN])

@@ -27,6 +27,7 @@ SPECIAL = {
         "psi_q_wb": np.outer(np.ones(5), 0.0158 * GRID - 1e-5 * GRID**3),
     },
     "machine.cogging_order": 24,
+    "machine.shorted_phase": 2,
     "machine.pole_pairs": 5,
     "sensors.position_direction": -1,
     "sensors.seed": 3,
