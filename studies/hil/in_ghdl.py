@@ -4,7 +4,7 @@
 python -m studies.hil.in_ghdl [PERIODS]
 
 A bench without software: constants at all inputs, the gates of every clock in a file.  The motor is linear, as its
-tables stay as an FPGA's configuration leaves them; a period has 3000 clocks, so that some hundred are minutes.
+tables stay as an FPGA's configuration leaves them; a period has 3000 clocks.
 """
 
 from __future__ import annotations
@@ -58,7 +58,14 @@ def bench_text(of: Parts, flat_file) -> str:
     own = {**of.motor._asdict(), **of.sensors._asdict(), **of.bus._asdict()}
     values |= {f"motor_{name}": value for name, value in own.items()}
     lines = ["library ieee;", "use ieee.std_logic_1164.all;", "use ieee.numeric_std.all;"]
-    lines += ["use work.fluxproof_pkg.all;", "", f"entity {BENCH} is", "  generic (CLOCKS : natural := 1);"]
+    lines += [
+        "use work.fluxproof_pkg.all;",
+        "",
+        f"entity {BENCH} is",
+        "  generic (",
+        "    CLOCKS : natural := 1",
+        "  );",
+    ]
     lines += [f"end entity {BENCH};", "", f"architecture test of {BENCH} is"]
     lines += [f"  constant {name} : integer := {value};" for name, value in generics.items()]
     lines += [f"  signal {n} : {p.vhdl_type}{_start(n)};" for n, p in entity.pins.items()]
