@@ -81,7 +81,8 @@ def test_the_waveform_of_a_relative_folder_lies_there(monkeypatch, tmp_path):
 def test_the_golden_board_can_be_compiled():
     """The runs above are not compiled: numba takes no record that leaves a field out, nor a choice among its values."""
     whole = 0
-    for call in ast.walk(ast.parse(inspect.getsource(board_clock.one_clock.py_func))):
+    sources = [inspect.getsource(kernel.py_func) for kernel in (board_clock.one_clock, board_clock.core_clock)]
+    for call in ast.walk(ast.parse("\n".join(sources))):
         if not isinstance(call, ast.Call) or not call.keywords:
             continue
         record = operator.attrgetter(ast.unparse(call.func))(board_clock)

@@ -63,6 +63,33 @@ def step(state, inputs, regs):
     return now, (u_d_now, u_q_now, i_d_now, i_q_now, hold_d, hold_q, rest_d, rest_q)
 
 
+def reference(v, state):
+    def towards(target, now, most):
+        return now * PU.lsb + min(max(target - now * PU.lsb, -most), most)
+
+    free = {x: v[f"u_{x}"] - v[f"u_comp_{x}"] for x in "dq"}
+    rest = {f"u_rest_{x}": _within_pu(free[x] - v[f"u_dec_{x}"]) for x in "dq"}
+    if not v["run"]:
+        return rest | dict.fromkeys(("u_d_now", "u_q_now", "i_d_now", "i_q_now"), 0.0)
+    if v["by_voltage"]:
+        u_now = {f"u_{x}_now": towards(v[f"u_{x}_ext"], getattr(state, f"u_{x}_now"), v["u_step"]) for x in "dq"}
+        return rest | u_now | {"i_d_now": v["i_d"], "i_q_now": v["i_q_made"]}
+    holds = state.hold_q and not v["regulates"]
+    i_now = {
+        "i_d_now": towards(v["i_d_source"], state.i_d_now, v["i_step"]),
+        "i_q_now": towards(v["i_q_ext"], state.i_q_now, v["i_step"]) if holds else v["torque_ref"],
+    }
+    return rest | {f"u_{x}_now": _within_pu(free[x]) for x in "dq"} | i_now
+
+
+def _within_pu(x):
+    return min(max(x, PU.lo * PU.lsb), PU.hi * PU.lsb)
+
+
+def bound(_v, _state):
+    return dict.fromkeys((p.name for p in OUTPUTS if p.fmt is PU), 0.0)  # sums and limits only: exact
+
+
 def stimuli(rng, _config):
     """Both ends of every sum; targets within a step, at it and beyond it, in and after each mode; a stop."""
     rows = []
@@ -130,7 +157,7 @@ BLOCK = Block(
     state=State(),
     latency=6,
     interval=6,
-    reference=None,
-    bound=None,
+    reference=reference,
+    bound=bound,
     stimuli=stimuli,
 )

@@ -160,4 +160,4 @@ def test_a_rated_current_of_ten_times_the_true_one_leaves_a_resistance_a_resista
     assert swing.max() < 0.2 * base.machine["rated_current_a"] and len(view) > 20
     setup = Setup(view, {"dead_time": EFFECT, "resistance": CATALOGUE["resistance"]}, np.ones(len(view), bool))
     problem = Problem(setup)
-    assert problem.fit(["resistance"]).value > problem.fit(["dead_time"]).value + 100.0
+    assert fit_set(problem, ["resistance"]).value > fit_set(problem, ["dead_time"]).value + 100.0

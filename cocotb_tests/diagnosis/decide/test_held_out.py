@@ -95,8 +95,9 @@ def test_a_mean_torque_counts_beside_the_noise_of_its_ripple(monkeypatch):
     best = SimpleNamespace(
         names=("a",),
         left=lambda: left,
-        problem=SimpleNamespace(setup=setup, fit=lambda names: without),
+        problem=SimpleNamespace(setup=setup),
     )
+    monkeypatch.setattr(held_out, "fit_set", lambda problem, names: without)
     monkeypatch.setattr(held_out, "_uncertain", lambda fit, rows: np.zeros(len(rows)))
     posterior = SimpleNamespace(best=lambda: best, setup=setup)
     assert held_out.helps(posterior, "a", np.ones(1, bool))

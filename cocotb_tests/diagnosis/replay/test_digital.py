@@ -47,6 +47,7 @@ SILENT += ("position_mode", "position_kp", "position_band", "omega_most", "posit
 SILENT += ("jerk_bits", "use_stops", "stop_low", "stop_high", "torque_lead", "k_inertia", "k_viscous", "coulomb")
 SILENT += ("use_table", "k_flux", "u_share", "k_voltage", "share_min", "k_torque", "omega_learn", "torque_step")
 SILENT += ("table_word",)  # without the torque table
+SILENT += ("voltage_mode", "u_d_ext", "u_q_ext", "u_step", "i_step")  # without the modes
 # Of these registers a recording has what each sample had; one without these signals is replayed with the registers.
 TOLD = {"speed_given": "speed_was_given", "position_restart": "position_restarted"}
 
@@ -168,6 +169,15 @@ def test_flipped_output(signal, bit, block, row, run, tmp_path):
     assert found["golden"] == digital.hexadecimal(int(observed[signal][row])) and found["differing"] == [signal]
     assert found["cause"]["kind"] == "record"
     assert found["golden_si"] == pytest.approx(to_si(signal, int(observed[signal][row]), DRIVE))
+
+
+def test_a_signal_of_a_block_that_the_core_has_not_is_zero(run, tmp_path):
+    """A bit flipped in a file ended in an IndexError."""
+    samples, observed, last = run
+    changed = observed | {"residual_sum": np.zeros(len(samples), np.int64)}
+    changed["residual_sum"][700] = 4
+    found = digital.replay(recording(dump(tmp_path / "a.dump", (samples, changed, last))))[0].first_difference
+    assert (found["signal"], found["sample"], found["golden"]) == ("residual_sum", 700, digital.hexadecimal(0))
 
 
 @pytest.mark.parametrize(("field", "bit", "block"), [

@@ -168,9 +168,12 @@ def where_they_part(run: Run, cause: Cause, state, first: int, row: int) -> tupl
 
 
 def golden_value(run: Run, state, row, name) -> int:
-    """The golden model's value of a signal in a row; ``state`` is the one before the row."""
-    said = trace(state, run.sample(row), run.registers, run.config, run.of_speed(row))
-    return said[OWNER[name]][outputs_of(OWNER[name]).index(name)]
+    """The golden model's value of a signal in a row, zero of a block that the core has not.
+
+    state: the one before the row.
+    """
+    said = trace(state, run.sample(row), run.registers, run.config, run.of_speed(row))[OWNER[name]]
+    return said[outputs_of(OWNER[name]).index(name)] if said else 0
 
 
 def flipped(value, bit, fmt) -> int:
