@@ -51,6 +51,7 @@ def in_ghdl(periods: int, run: str, folder: Path, compiled: bool = False) -> dic
     return json.loads((folder / "board.json").read_text()) | {"folder": folder}
 
 
+@pytest.mark.slow
 def test_closed_loop_in_ghdl(tmp_path):
     """136 periods of 160 clocks: every register over the bus, enabled, the motor turns, the index is found."""
     facts = in_ghdl(136, "standstill, short periods", tmp_path)
