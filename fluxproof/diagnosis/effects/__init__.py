@@ -28,16 +28,7 @@ from fluxproof.diagnosis.effects.constant import Constant
 from fluxproof.diagnosis.effects.course import Drift
 from fluxproof.diagnosis.effects.drive_file import Caveat, Described, Relative, Restates
 from fluxproof.diagnosis.effects.effect import NEEDS, Effect, Orders
-from fluxproof.diagnosis.effects.estimate import (
-    DOUBT,
-    Parameter,
-    believable,
-    disbelief,
-    is_usual,
-    one,
-    plausible_range,
-    sigma,
-)
+from fluxproof.diagnosis.effects.estimate import DOUBT, Parameter, believable, is_usual, one, plausible_range, sigma
 from fluxproof.diagnosis.effects.flux_effect import LEAST_CURRENT, BentFlux, FluxEffect, LostFlux
 from fluxproof.diagnosis.effects.free_curve import Alternatives, FreeCurve
 from fluxproof.diagnosis.effects.inverter import LegLoss, ShaftTorque
@@ -72,7 +63,6 @@ __all__ = [
     "Wave",
     "angle_error",
     "believable",
-    "disbelief",
     "current_error",
     "flux",
     "is_usual",

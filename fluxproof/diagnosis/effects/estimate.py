@@ -54,17 +54,6 @@ def is_usual(parameters: dict[str, Estimate], plausible: dict, nominal) -> bool:
 
 def believable(estimate, limits, nominal) -> bool:
     """Whether an estimate is within what its effect declares as plausible, or doubtfully beyond it."""
-    return disbelief(estimate, limits, nominal) == 0.0
-
-
-def disbelief(estimate, limits, nominal) -> float:
-    """How far an estimate is beyond what is plausible, its doubt taken off: from 0 within to 1 at a factor of two.
-
-    With a step, an L_d of 3.4 times the nameplate's was a bus sensor that is 6 % off beside one of 3 times.
-    """
     low, high = plausible_range(limits, nominal)
     doubt = DOUBT * estimate.sigma if np.isfinite(estimate.sigma) else 0.0
-    if low - doubt <= estimate.value <= high + doubt:
-        return 0.0
-    far, limit = (estimate.value - doubt, high) if estimate.value > high else (estimate.value + doubt, low)
-    return float(min(abs(np.log2(far / limit)), 1.0)) if far * limit > 0.0 else 1.0
+    return low - doubt <= estimate.value <= high + doubt

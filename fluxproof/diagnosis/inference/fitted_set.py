@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fluxproof.diagnosis.effects import disbelief
+from fluxproof.diagnosis.effects import believable
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.problem import Problem
 
@@ -73,20 +73,17 @@ def covariance_of(fit: FittedSet, name: str, full: np.ndarray) -> np.ndarray:
     return out
 
 
-def implausible(fit: FittedSet, name: str | None = None) -> float:
-    """Number of the parameters of a set, or of one effect of it, beyond what their effects declare as plausible.
-
-    One that is little beyond counts in part.
-    """
+def implausible(fit: FittedSet, name: str | None = None) -> int:
+    """Number of the parameters of a set, or of one effect of it, beyond what their effects declare as plausible."""
     return sum(_implausible(fit, n) for n in fit.names if name in (None, n))
 
 
-def _implausible(fit, name) -> float:
+def _implausible(fit, name) -> int:
     effect, nominal = fit.problem.setup.effects[name], fit.problem.view.nominal
     if not effect.plausible:
-        return 0.0
+        return 0
     found = effect.estimates(fit.c[name], covariance_of(fit, name, fit.cov), nominal)
-    return sum(disbelief(found[key], limits, nominal) for key, limits in effect.plausible.items() if key in found)
+    return sum(not believable(found[key], limits, nominal) for key, limits in effect.plausible.items() if key in found)
 
 
 def log_too_small(fit: FittedSet, names) -> float:
