@@ -15,10 +15,10 @@ from fluxproof.diagnosis.effects.drive_file import Restates, relative, restated
 from fluxproof.diagnosis.ground.plant_section import in_addition
 from fluxproof.diagnosis.ground.result import Estimate, NamedEffect
 from fluxproof.diagnosis.inference.fit import fit_set
-from fluxproof.diagnosis.inference.fitted_set import covariance_of
+from fluxproof.diagnosis.inference.fitted_set import FittedSet, covariance_of
 
 
-def without_possible(names, best):
+def without_possible(names, best: FittedSet) -> tuple[FittedSet, float]:
     """(the best set without the effects that are only possible, the probability that one of them is not there)."""
     possible = names.only_possible(best)
     if not possible:
@@ -37,7 +37,7 @@ def named_effects(names, posterior, explains, only=None) -> list[NamedEffect]:
     for name in sorted(names.named if only is None else only):
         effect, c = effects[name], best.c[name]
         nominal = given if isinstance(effect, Restates) else restated(effects, best.c, given)
-        simpler = fewer.c.get(name, c)
+        simpler = fewer.c[name] if name in fewer.c else c
         c = {key: (1.0 - absent) * v + absent * simpler.get(key, 0.0) for key, v in c.items()}
         estimates = effect.estimates(c, covariance_of(best, name, best.cov), nominal)
         estimates = _with_absence(estimates, effect, (best.c[name], simpler), absent, nominal)
