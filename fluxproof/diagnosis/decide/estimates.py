@@ -37,7 +37,7 @@ def named_effects(names, posterior, explains, only=None) -> list[NamedEffect]:
     for name in sorted(names.named if only is None else only):
         effect, c = effects[name], best.c[name]
         nominal = given if isinstance(effect, Restates) else restated(effects, best.c, given)
-        simpler = fewer.c.get(name, best.c[name])
+        simpler = c | fewer.c.get(name, {})
         c = {key: (1.0 - absent) * v + absent * simpler.get(key, 0.0) for key, v in c.items()}
         estimates = effect.estimates(c, covariance_of(best, name, best.cov), nominal)
         estimates = _with_absence(estimates, effect, (best.c[name], simpler), absent, nominal)
