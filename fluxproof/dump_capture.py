@@ -16,6 +16,7 @@ from fluxproof.commission.bus import BusError, UioBus
 from fluxproof.commission.ring import read_ring
 from fluxproof.diagnosis.whole_drive import load_drive
 from fluxproof.files import refuse_overwriting
+from fluxproof.print_registers import flux_of
 from fluxproof.quote import put, say
 from fluxproof.stage import alone
 from golden_model import fluxproof
@@ -49,6 +50,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--ring", action="store_true", help="capture.bin is /dev/uioN: read the rows that the core's ring kept"
     )
+    parser.add_argument(
+        "--flux-map", metavar="FILE", help="the map that the torque table was made of, as for `fluxproof registers`"
+    )
+    parser.add_argument(
+        "--changes",
+        metavar="FILE",
+        help="JSON: [[number of a sample, {register: integer}], ...] that the host wrote while the drive ran, [] for "
+        "none: position and voltage mode are replayed with it",
+    )
     parser.add_argument("-o", "--out", metavar="FILE", help="the dump (default: the capture's name with .fluxdump)")
 
 
@@ -59,18 +69,19 @@ def run(args: argparse.Namespace) -> int:
     if args.ring and not args.out:
         raise DriveError("--ring: the dump needs a name: -o run.fluxdump")
     out = Path(args.out) if args.out else Path(args.capture).with_suffix(".fluxdump")
-    refuse_overwriting([out], [args.capture, args.drive, args.registers])
+    refuse_overwriting([out], [args.capture, args.drive, args.registers, args.flux_map, args.changes])
     drive = load_drive(args.drive)
     try:
-        register_set = board_set(drive)
+        register_set = board_set(drive, flux_of(args.flux_map, drive))
     except DriveError as error:
         raise DriveError(f"{args.drive}: {error}") from None
     if args.registers:
         register_set = with_registers(register_set, Path(args.registers))
+    changes = changes_of(Path(args.changes)) if args.changes else None
     capture = parse(ring_of(args.capture), args.capture) if args.ring else read_capture(args.capture)
     number = chosen(capture.pieces, args.piece, args.capture)
     with alone(out) as file:
-        write_piece(file, capture.pieces[number], drive, register_set)
+        write_piece(file, capture.pieces[number], drive, register_set, changes)
     put("\n".join(summary(capture, number)))
     say(f"wrote {out}")
     return 0
@@ -116,12 +127,7 @@ def with_registers(base: RegisterSet, path: Path) -> RegisterSet:
     """``base`` with the integers of a JSON file; DriveError names an unknown register or an invalid value."""
     from fluxproof.diagnosis.replay.telemetry import CONFIG
 
-    try:
-        data = json.loads(read_regular(path, MOST_BYTES).decode("utf-8"))
-    except OSError as error:
-        raise DriveError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except (ValueError, RecursionError) as error:
-        raise DriveError(f"{path}: not JSON: {error}") from None
+    data = _json_of(path)
     if not isinstance(data, dict):
         raise DriveError(f"{path}: expected an object of registers, found {type(data).__name__}")
     whole = isinstance(data.get("registers"), dict)
@@ -133,6 +139,28 @@ def with_registers(base: RegisterSet, path: Path) -> RegisterSet:
     _check(path, "register", values, ranges)
     _check(path, "generic", generics, CONFIG)
     return base._replace(values=base.values._replace(**values), config=base.config._replace(**generics))
+
+
+def changes_of(path: Path) -> dict[int, dict[str, int]]:
+    """{number of a sample: {register: integer}} of a JSON file; DriveError where it is none."""
+    data, ranges = _json_of(path), {name: (port.low, port.high) for name, port in fluxproof.REGISTERS.items()}
+    found: dict[int, dict[str, int]] = {}
+    for k, change in enumerate(data if isinstance(data, list) else [data]):
+        if not isinstance(change, list) or [type(part) for part in change] != [int, dict] or change[0] < 0:
+            raise DriveError(f"{path}: change {k + 1}: expected [number of a sample, {{register: integer}}]")
+        _check(path, "register", change[1], ranges)
+        found[change[0]] = found.get(change[0], {}) | change[1]
+    return found
+
+
+def _json_of(path: Path):
+    """The contents of a JSON file."""
+    try:
+        return json.loads(read_regular(path, MOST_BYTES).decode("utf-8"))
+    except OSError as error:
+        raise DriveError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except (ValueError, RecursionError) as error:
+        raise DriveError(f"{path}: not JSON: {error}") from None
 
 
 def _integer(value):

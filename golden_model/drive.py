@@ -53,7 +53,7 @@ class Machine:
 
 @dataclass(frozen=True)
 class Inverter:
-    """[inverter]; thresholds, slopes and zero_current_a serve simulation alone."""
+    """[inverter]; thresholds, slopes, zero_current_a and switch_rated_v serve simulation alone."""
 
     # Names as in plant.Inverter.
 
@@ -68,6 +68,7 @@ class Inverter:
     zero_current_a: float = not_negative("A", "width of the zone around zero current", 0.0)
     min_on_time_s: float | None = positive("s", "shortest time that a switch is on; this or min_pulse_s", None)
     bootstrap_charge_s: float = not_negative("s", "all lower switches on before the drive switches; 0: none", 0.0)
+    switch_rated_v: float | None = positive("V", "bus voltage that the switches stand; none: not judged", None)
 
     @property
     def leg_pulse_s(self):

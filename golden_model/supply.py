@@ -25,6 +25,7 @@ class Supply:
     resistance_ohm: float | None = not_negative(
         "ohm", "of the source; 2 % of the bus at the drive's power if none", None
     )
+    capacitor_rated_v: float | None = positive("V", "what the capacitor stands; none: not judged", None)
     brake_resistor_ohm: float | None = positive("ohm", "switched by the pin brake; the drive's power if none", None)
 
 

@@ -7,6 +7,7 @@ import json
 import signal
 from contextlib import nullcontext
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -77,6 +78,49 @@ def test_an_inductance_of_a_held_voltage():
     found = answer.imag / (2.0 / t_s * np.sin(w * t_s / 2.0))
     assert answer.real == pytest.approx(ohm * np.cos(w * t_s / 2.0))
     assert found > 1.003 * henry and winding.held(ohm * t_s, found) == pytest.approx(henry)
+
+
+def rotating(current, w, l_q, ohm=0.4, l_d=1e-3, v_dead=0.5, k=2.0, t_s=1e-4):
+    """A Point that obeys the equations of winding.py exactly."""
+    i_d, i_q = complex(current), -1j * current
+    s_d, s_q = 4.0 / np.pi * i_d / current, 4.0 / np.pi * i_q / current
+    w_e, cosine = 2.0 / t_s * np.sin(w * t_s / 2.0), np.cos(w * t_s / 2.0)
+    u_d = (ohm * cosine + 1j * w_e * l_d) * i_d + v_dead * s_d
+    u_q = (ohm * cosine + 1j * w_e * l_q + k / (1j * w)) * i_q + v_dead * s_q
+    axes = {"axes_i": (i_d, i_q), "axes_u": (u_d, u_q), "axes_s": (s_d, s_q)}
+    point = winding.Point.__new__(winding.Point)
+    vars(point).update(axes, w=w, current=current)
+    return point
+
+
+@pytest.mark.parametrize("falls", [0.0, 0.3])
+def test_inductances_at_several_currents(falls):
+    """Of a q axis that saturates each amplitude has its own; the drive gets the one of the largest current."""
+    known = {}
+    session = SimpleNamespace(t_s=1e-4, limit=10.0, know=lambda section, **values: known.update(values))
+    plan = [(a, s * w) for a in (3.0, 5.0, 7.0) for s in (1, -1) for w in ((1500.0,) if a < 7.0 else (1500.0, 900.0))]
+    points = [rotating(a, w, 3e-3 * (1.0 - falls * (a - 3.0) / 4.0)) for a, w in plan]
+    step = winding.judge(session, points)  # pyright: ignore[reportArgumentType]
+    henry = [row["inductance_q_h"] for row in step.notes["inductances"]]
+    wanted = [winding.held(0.4e-4, 3e-3 * (1.0 - falls * part)) for part in (0.0, 0.5, 1.0)]
+    assert henry == pytest.approx(wanted, rel=1e-3)
+    assert known["inductance_q_h"] == pytest.approx(wanted[-1], rel=1e-3)
+    assert known["inductance_d_h"] == pytest.approx(winding.held(0.4e-4, 1e-3), rel=1e-3)
+    assert ("L_q 3" in step.said and "known up to 7 of 10 A" in step.said) == (falls > 0.0)
+
+
+@pytest.mark.slow
+def test_a_saturating_motor_is_commissioned_with_the_torque_table_in_its_file():
+    """Measured without the table; the file keeps it, and what depends on the current is told."""
+    drive = load(DRIVE)
+    drive = replace(drive, core=replace(drive.core, references=True))
+    board = board_of(drive)
+    machine = replace(board.machine, saturation_q_per_a2=0.5 / drive.current_limit_a**2)
+    found, steps = commission(SimulatedBus(drive, replace(board, machine=machine)), drive)
+    assert found.core.references
+    rows = {step.name: step for step in steps}["winding"].notes["inductances"]
+    assert rows[0]["inductance_q_h"] > 1.04 * rows[-1]["inductance_q_h"]
+    assert found.machine.inductance_d_h == pytest.approx(drive.machine.inductance_d_h, rel=0.03)
 
 
 @pytest.mark.parametrize("hall", [False, True])

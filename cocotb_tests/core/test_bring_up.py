@@ -220,3 +220,19 @@ def test_the_index_is_looked_for_before_the_encoder_is_believed(tmp_path, monkey
     assert ("index found" in done.stdout) == (status == 0)
     if status:
         assert "no index in 2.2 turns" in done.stderr
+
+
+@pytest.mark.parametrize("references", [False, True])
+def test_torque_in_newton_metres_with_and_without_the_table(tmp_path, monkeypatch, references):
+    """The torque read back is the one asked for, the search of the index and a current leave the table out."""
+    drive = drives.load(DRIVES / "servo_24v.toml")
+    drive = dataclasses.replace(drive, core=dataclasses.replace(drive.core, references=references))
+    program = compiled(tmp_path, drive, ROOT / "cocotb_tests" / "support" / "host" / "bus_memory.c")
+    monkeypatch.setenv("FLUXPROOF_INDEX_AFTER", "60")
+    for words, said in (("0.1 Nm 100", r"0\.100 Nm wanted, 0\.(100|099) Nm"), ("-0.1 Nm 100", r"-0\.(100|099) Nm est")):
+        done = subprocess.run([program, *words.split()], capture_output=True, text=True)
+        assert done.returncode == 0 and re.search(said, done.stdout), done.stdout + done.stderr
+    done = subprocess.run([program, "2", "A", "100"], capture_output=True, text=True)
+    assert done.returncode == 0 and "2.00 A wanted, i_q 2.00 A" in done.stdout, done.stdout + done.stderr
+    done = subprocess.run([program, "1e4", "Nm", "100"], capture_output=True, text=True)
+    assert done.returncode == 1 and "out of range" in done.stderr

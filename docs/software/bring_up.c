@@ -7,6 +7,7 @@
  *   cc -Wall -Wextra -I docs/software -I . docs/software/bring_up.c docs/software/bus_uio.c -lm -o bring_up
  *   ./bring_up 300             speed mode: speed in rpm
  *   ./bring_up 0.5 A 200       torque mode: current i_q in A, and the speed in rpm at which it gives up
+ *   ./bring_up 1.2 Nm 200      torque mode in Nm: by the torque table, else by i_q of the magnets' flux linkage
  */
 
 #define _POSIX_C_SOURCE 200809L
@@ -271,13 +272,44 @@ static void turn_at(double rpm)
     ramp(AT(omega_ref), lsb, rpm, 0.0, HUGE_VAL);
 }
 
+static double torque_nm(void)
+{
+    return get_signed(AT(torque)) / 65536.0 * FLUXPROOF_BASE_TORQUE_NM;
+}
+
+/* Newton metres of one in i_q_ext: of the torque with the table, of i_q and the magnets without it. */
+static double nm_per_lsb(void)
+{
+    if (get(AT(use_table)))
+        return FLUXPROOF_BASE_TORQUE_NM / 65536.0;
+    double flux_wb = get_signed(AT(lambda_mg)) / 65536.0 * FLUXPROOF_BASE_FLUX_WB;
+    if (flux_wb <= 0.0)
+        fail("a torque needs the torque table or magnets: lambda_mg is zero");
+    return 1.5 * get(AT(pole_pairs)) * flux_wb * FLUXPROOF_BASE_CURRENT_A / 65536.0;
+}
+
+static void push_by(double torque, double most_rpm)
+{
+    double lsb = nm_per_lsb();
+    if (fabs(torque / lsb) > 131071.0)
+        fail("%.3g Nm is out of range: allowed is +-%.3g Nm", torque, 131071.0 * lsb);
+    ramp(AT(i_q_ext), lsb, 0.0, torque, most_rpm);
+    double reached = torque_nm();
+    printf("%.3f Nm wanted, %.3f Nm estimated, i_d %.2f A, i_q %.2f A, %.1f rpm\n", torque, reached, current_a(AT(i_d)),
+           current_a(AT(i_q)), speed_rpm());
+    if (fabs(reached - torque) > 0.1 * fabs(torque) + 0.01 * FLUXPROOF_BASE_TORQUE_NM)
+        fail("%.3f Nm instead of %.3f", reached, torque);
+    ramp(AT(i_q_ext), lsb, torque, 0.0, most_rpm);
+}
+
 static void push_with(double current, double most_rpm)
 {
     double lsb = FLUXPROOF_BASE_CURRENT_A / 65536.0;
+    put(AT(use_table), 0); /* with the table i_q_ext would be a torque */
     ramp(AT(i_q_ext), lsb, 0.0, current, most_rpm);
     double reached = current_a(AT(i_q));
     printf("%.2f A wanted, i_q %.2f A measured, %.1f rpm, torque %.3f Nm\n", current, reached, speed_rpm(),
-           get_signed(AT(torque)) / 65536.0 * FLUXPROOF_BASE_TORQUE_NM);
+           torque_nm());
     if (fabs(reached - current) > 0.1 * fabs(current) + 0.01 * FLUXPROOF_BASE_CURRENT_A)
         fail("i_q is %.2f A instead of %.2f", reached, current);
     ramp(AT(i_q_ext), lsb, current, 0.0, most_rpm);
@@ -293,8 +325,9 @@ static void find_index(void)
         return;
     uint32_t most = get(AT(i_max)) * 6 / 10;
     double turn_s = fmax(0.8, get(AT(pole_pairs)) / 6.0), turns = get(AT(index_once)) ? 1.2 : 2.2;
-    uint32_t mode = get(AT(speed_mode));
+    uint32_t mode = get(AT(speed_mode)), table = get(AT(use_table));
     put(AT(speed_mode), 0);
+    put(AT(use_table), 0); /* with the table i_d_ref is not read */
     put(AT(forced_angle), 0);
     put(AT(forced_rate), 0);
     put(AT(position_source), 1);
@@ -312,6 +345,7 @@ static void find_index(void)
     put(AT(forced_rate), 0);
     put(AT(position_source), 0);
     put(AT(speed_mode), mode);
+    put(AT(use_table), table);
     if (!found)
         fail("no index in %.1f turns, or not twice at the same place: check the line Z and index_phase", turns);
     printf("index found\n");
@@ -334,9 +368,10 @@ static void stop(void)
 int main(int argc, char **argv)
 {
     setvbuf(stdout, NULL, _IOLBF, 0);
-    bool torque_mode = argc > 2 && strcmp(argv[2], "A") == 0;
+    bool by_torque = argc > 2 && strcmp(argv[2], "Nm") == 0;
+    bool torque_mode = by_torque || (argc > 2 && strcmp(argv[2], "A") == 0);
     if (argc > 2 && (!torque_mode || argc != 4)) {
-        fputs("usage: bring_up [RPM], or bring_up CURRENT A MOST_RPM\n", stderr);
+        fputs("usage: bring_up [RPM], bring_up CURRENT A MOST_RPM, or bring_up TORQUE Nm MOST_RPM\n", stderr);
         return 2;
     }
     catch_signals();
@@ -346,7 +381,9 @@ int main(int argc, char **argv)
     check_at_rest();
     find_index();
     enable_gates();
-    if (torque_mode)
+    if (by_torque)
+        push_by(atof(argv[1]), atof(argv[3]));
+    else if (torque_mode)
         push_with(atof(argv[1]), atof(argv[3]));
     else
         turn_at(argc > 1 ? atof(argv[1]) : 300.0);

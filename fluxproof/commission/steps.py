@@ -52,8 +52,10 @@ def commission(
     ``hold_a``: only a direct current [A] for an ammeter; the drive is then the given one.  ``respond``: step responses
     too, which measure nothing of the drive.
     """
-    # With one update a period: the equations of a snapshot are those of a voltage that stands a whole period.
-    session, steps = Session(bus, replace(drive, core=replace(drive.core, updates_per_period=1)), progress), []
+    # With one update a period: the equations of a snapshot are those of a voltage that stands a whole period.  Without
+    # the torque table: i_d_ref and i_q_ext are currents.
+    plain = replace(drive, core=replace(drive.core, updates_per_period=1, references=False))
+    session, steps = Session(bus, plain, progress), []
 
     def add(step: Step) -> Step:
         steps.append(step)

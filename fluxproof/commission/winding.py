@@ -21,9 +21,10 @@ V_dead*T/L), the current stops before its fundamental does: the loss leads S by 
 The second term is across the current as w*L*I is; without it L is too large by V_dead*i_0/(w*I^2), 1 % at worst, and no
 residual tells.  Three amplitudes separate them.  K is the EMF of the rotor that the torque swings.
 Several amplitudes separate R from V_dead, both senses cancel what a slow turn of the rotor adds, two frequencies
-separate L_q from K.  Each equation is turned into the direction of its current: the part along it has R and V_dead, the
-part across it L and K; each kind counts by the rms of its own residuals.  The frequency is high: at a low one the
-current stays at zero for a while whenever it changes sign, and its sign is no longer all that counts.
+separate L_q from K.  A second regression has L_d and L_q of each amplitude: the mean over a turn of a current of that
+size, for a winding that saturates.  Each equation is turned into the direction of its current: the part along it has R
+and V_dead, the part across it L and K; each kind counts by the rms of its own residuals.  The frequency is high: at a
+low one the current stays at zero for a while whenever it changes sign, and its sign is no longer all that counts.
 """
 
 from __future__ import annotations
@@ -48,7 +49,8 @@ RAMP_S, SETTLE_S, SAMPLES = 0.1, 0.15, 250
 PARKED_S = 0.5  # each of raising, holding and lowering the field that moves the rotor to the middle of a sector
 STOOD_DEG = 25.0  # electrical, largest turn of the rotor in a run
 UNKNOWN_SWING = 60.0  # rad/s, without an inertia in the file
-MISFIT = 0.03  # of the voltages, rms
+MISFIT = 0.03  # of the voltages, rms; of an inductance, from which on its change with the current is told
+SURE = 3.0  # sigma, of that change
 LARGEST_SIGMA = 0.03  # of R and L
 ORDERS = (1, -1, -5, 7, 5, -7, -11, 13)
 REPEATED = 2.0  # what the equation leaves is its own error rather than noise, and the run of the other sense repeats it
@@ -58,10 +60,10 @@ GRID = TURN_RAD / 720 * np.arange(720)  # phi, to find the harmonics of the sign
 class Point:
     """The harmonics of one run: current and voltage at the frequency w [rad/s]."""
 
-    def __init__(self, seen: Seen, rotor: np.ndarray, w: float, t_s: float):
+    def __init__(self, seen: Seen, rotor: np.ndarray, w: float, t_s: float, current: float):
         phi = seen.theta_me - rotor
         orders = np.array(ORDERS) - 1
-        self.w = w
+        self.w, self.current = w, current  # the amplitude that was asked for
         self.i = np.linalg.lstsq(np.exp(1j * np.outer(phi, orders)), seen.current, rcond=None)[0]
         ahead = phi + 1.5 * w * t_s
         basis = np.exp(1j * np.outer(ahead, orders))
@@ -157,7 +159,7 @@ def _run(s: Session, current: float, w: float) -> Point:
             f"the rotor turned by {math.degrees(np.ptp(line)):.0f} degrees in a field of {w / TURN_RAD:.0f} Hz, "
             f"expected {STOOD_DEG:.0f} at most: something drives the shaft, or the inertia is too small"
         )
-    return Point(seen, line, w, s.t_s)
+    return Point(seen, line, w, s.t_s, current)
 
 
 def _to_the_middle(s: Session) -> None:
@@ -183,58 +185,93 @@ def held(flux: float, henry: float) -> float:
     return flux / (2.0 * math.atanh(x)) if 0.0 < x < 1.0 else henry
 
 
+class Fit:
+    """A regression over all runs: R, V_dead, K, V_dead*i_0 common, L_d and L_q of each group of runs, with sigmas."""
+
+    def __init__(self, s: Session, points: list[Point], groups: list[int]):
+        count = max(groups) + 1
+        rows, values, sizes = [], [], []
+        for p, group in zip(points, groups, strict=True):
+            w_e, cosine = 2.0 / s.t_s * math.sin(p.w * s.t_s / 2.0), math.cos(p.w * s.t_s / 2.0)
+            (i_d, i_q), (u_d, u_q), (s_d, s_q) = p.axes_i, p.axes_u, p.axes_s
+            for axis, i, swings, sign, value in ((0, i_d, 0.0, s_d, u_d), (1, i_q, i_q / (1j * p.w), s_q, u_q)):
+                inductive = np.zeros(2 * count, complex)
+                inductive[axis * count + group] = 1j * w_e * i
+                lead = 1j * math.copysign(1.0, p.w) * sign / abs(i)
+                row = np.array([cosine * i, sign, swings, lead, *inductive])
+                turned, along = row * np.conj(i) / abs(i), value * np.conj(i) / abs(i)
+                rows += [np.real(turned), np.imag(turned)]
+                values += [along.real, along.imag]
+                sizes.append(abs(value))
+        matrix, values = np.array(rows, float), np.array(values)
+        weights = np.ones(len(values))
+        for _ in range(3):  # each kind of equation by its own residuals
+            weighted = matrix * weights[:, None]
+            scale = np.linalg.norm(weighted, axis=0)
+            found, sigma, _ = solve(weighted / scale, values * weights)
+            found, sigma = found / scale, sigma / scale
+            rest = values - matrix @ found
+            for kind in (0, 1):
+                weights[kind::2] = 1.0 / max(math.sqrt(float(np.mean(rest[kind::2] ** 2))), 1e-9)
+        sigma = np.multiply(sigma, math.sqrt(REPEATED))
+        self.misfit = math.sqrt(float(np.mean(rest**2)) * 2.0 / float(np.mean(np.square(sizes))))
+        self.r, self.v_dead, self.k, self.lead = map(float, found[:4])
+        self.s_r, self.s_v, self.s_k = map(float, sigma[:3])
+        self.l_d, self.l_q = ([held(self.r * s.t_s, float(x)) for x in part] for part in np.split(found[4:], 2))
+        self.s_l_d, self.s_l_q = (list(map(float, part)) for part in np.split(sigma[4:], 2))
+
+
 def judge(s: Session, points: list[Point]) -> Step:
-    """One regression over all runs; unknowns R, L_d, L_q, V_dead, K, V_dead*i_0."""
-    rows, values, sizes = [], [], []
-    for p in points:
-        w_e, cosine = 2.0 / s.t_s * math.sin(p.w * s.t_s / 2.0), math.cos(p.w * s.t_s / 2.0)
-        (i_d, i_q), (u_d, u_q), (s_d, s_q) = p.axes_i, p.axes_u, p.axes_s
-        for i, row, value in (
-            (i_d, (cosine * i_d, 1j * w_e * i_d, 0.0, s_d, 0.0), u_d),
-            (i_q, (cosine * i_q, 0.0, 1j * w_e * i_q, s_q, i_q / (1j * p.w)), u_q),
-        ):
-            row = (*row, 1j * math.copysign(1.0, p.w) * row[3] / abs(i))
-            turned, along = np.array(row) * np.conj(i) / abs(i), value * np.conj(i) / abs(i)
-            rows += [np.real(turned), np.imag(turned)]
-            values += [along.real, along.imag]
-            sizes.append(abs(value))
-    matrix, values = np.array(rows, float), np.array(values)
-    weights = np.ones(len(values))
-    for _ in range(3):  # each kind of equation by its own residuals
-        weighted = matrix * weights[:, None]
-        scale = np.linalg.norm(weighted, axis=0)
-        found, sigma, _ = solve(weighted / scale, values * weights)
-        found, sigma = found / scale, sigma / scale
-        rest = values - matrix @ found
-        for kind in (0, 1):
-            weights[kind::2] = 1.0 / max(math.sqrt(float(np.mean(rest[kind::2] ** 2))), 1e-9)
-    sigma = np.multiply(sigma, math.sqrt(REPEATED))
-    misfit = math.sqrt(float(np.mean(rest**2)) * 2.0 / float(np.mean(np.square(sizes))))
-    (r, l_d, l_q, v_dead, k, lead), (s_r, s_l_d, s_l_q, s_v, s_k, _) = found, sigma
-    l_d, l_q = (held(r * s.t_s, x) for x in (l_d, l_q))
-    if misfit > MISFIT:
+    """One regression over all runs; where the inductances depend on the current, those of the largest one."""
+    amplitudes = sorted({p.current for p in points})
+    one = Fit(s, points, [0] * len(points))
+    each = Fit(s, points, [amplitudes.index(p.current) for p in points])
+    fit = each if one.misfit > MISFIT >= each.misfit else one
+    if fit.misfit > MISFIT:
         raise Refusal(
-            f"R and L explain the voltages within {100 * misfit:.1f} % only, expected {100 * MISFIT:.0f} %: saturation "
-            "at this current, a blocked phase or a poor current sensor"
+            f"R and L explain the voltages within {100 * fit.misfit:.1f} % only, expected {100 * MISFIT:.0f} %: "
+            "saturation at this current, a blocked phase or a poor current sensor"
         )
+    r, l_d, l_q, v_dead = fit.r, fit.l_d[-1], fit.l_q[-1], fit.v_dead
+    s_r, s_l_d, s_l_q, s_v = fit.s_r, fit.s_l_d[-1], fit.s_l_q[-1], fit.s_v
     for name, value, error in (("R", r, s_r), ("L_d", l_d, s_l_d), ("L_q", l_q, s_l_q)):
         if not value > 0.0 or error > LARGEST_SIGMA * value:
             raise Refusal(
                 f"{name} = {value:.4g} +-{error:.2g}: expected an uncertainty below {100 * LARGEST_SIGMA:.0f} %; raise "
                 "the current limit or check the noise of the current sensors"
             )
-    s.know("machine", resistance_ohm=float(r), inductance_d_h=float(l_d), inductance_q_h=float(l_q))
+    s.know("machine", resistance_ohm=r, inductance_d_h=l_d, inductance_q_h=l_q)
     quantities = {
-        "resistance": Value(float(r), float(s_r), "ohm"),
-        "inductance_d": Value(float(l_d), float(s_l_d), "H"),
-        "inductance_q": Value(float(l_q), float(s_l_q), "H"),
-        "v_dead": Value(float(v_dead), float(s_v), "V"),
+        "resistance": Value(r, s_r, "ohm"),
+        "inductance_d": Value(l_d, s_l_d, "H"),
+        "inductance_q": Value(l_q, s_l_q, "H"),
+        "v_dead": Value(v_dead, s_v, "V"),
     }
     said = (
         f"R {r:.4g} +-{s_r:.1g} ohm, L_d {1e3 * l_d:.4g} +-{1e3 * s_l_d:.1g} mH, "
         f"L_q {1e3 * l_q:.4g} +-{1e3 * s_l_q:.1g} mH, "
-        f"V_dead {v_dead:.3g} +-{s_v:.1g} V, misfit {100 * misfit:.2f} %"
+        f"V_dead {v_dead:.3g} +-{s_v:.1g} V, misfit {100 * fit.misfit:.2f} %{_over_current(s, amplitudes, each)}"
     )
-    notes = {"misfit": misfit, "swing_k": [float(k), float(s_k)], "frequencies_hz": [p.w / TURN_RAD for p in points]}
-    notes["lead_v_a"] = float(lead)
+    notes = {"misfit": fit.misfit, "swing_k": [fit.k, fit.s_k], "frequencies_hz": [p.w / TURN_RAD for p in points]}
+    notes["lead_v_a"] = fit.lead
+    notes["inductances"] = [
+        {"current_a": float(amplitudes[k]), "inductance_d_h": each.l_d[k], "inductance_d_sigma_h": each.s_l_d[k],
+         "inductance_q_h": each.l_q[k], "inductance_q_sigma_h": each.s_l_q[k]}
+        for k in range(len(amplitudes))
+    ]  # fmt: skip
     return Step("winding", quantities, said, notes)
+
+
+def _over_current(s: Session, amplitudes: list[float], each: Fit) -> str:
+    """The inductances that depend on the current, and up to which one they are known; empty if none does."""
+    said = []
+    for name, values, sigmas in (("L_d", each.l_d, each.s_l_d), ("L_q", each.l_q, each.s_l_q)):
+        change, error = values[-1] - values[0], math.hypot(sigmas[0], sigmas[-1])
+        if abs(change) > max(SURE * error, MISFIT * abs(values[0])):
+            each_of = ", ".join(f"{1e3 * value:.4g}" for value in values)
+            said.append(f"{name} {each_of} mH")
+    if not said:
+        return ""
+    at = ", ".join(f"{a:.3g}" for a in amplitudes)
+    known = f"known up to {amplitudes[-1]:.3g} of {s.limit:.3g} A"
+    return f"; {' and '.join(said)} at {at} A, {known}: a torque table needs a map of it (registers --flux-map)"

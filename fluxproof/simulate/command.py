@@ -72,6 +72,8 @@ def summary(data: dict) -> list[str]:
             "brake_resistor_on_from",
         ),
         "Position": ("time_of_the_move", "following_error_largest", "position_error_at_the_end"),
+        "Speed range": ("base_speed", "speed_with_torque_with_references", "speed_with_torque_at_i_d_zero"),
+        "Trip at the top speed": ("speed_of_the_trip", "rectified_emf", "u_dc_high", "bus_voltage_after_the_trip"),
         "Heat": ("copper_loss_at_rated_current",),
     }
     for group, names in told.items():

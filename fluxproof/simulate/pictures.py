@@ -14,6 +14,7 @@ from fluxproof.simulate import scene as scenes
 from fluxproof.simulate.figures import rpm
 from fluxproof.simulate.margins import Loop
 from fluxproof.simulate.run import Run
+from fluxproof.simulate.speed_range import SpeedRange
 from golden_model.drive import Drive
 from golden_model.motion import count_turns
 from golden_model.units import to_si
@@ -22,7 +23,13 @@ COLUMNS = 700  # along the time axis: more than a screen's pixels in a picture o
 
 
 def draw(
-    drive: Drive, run: Run, step: Run, loops: dict[str, Loop], rippled: dict, moved: Run | None = None
+    drive: Drive,
+    run: Run,
+    step: Run,
+    loops: dict[str, Loop],
+    rippled: dict,
+    reached: SpeedRange,
+    moved: Run | None = None,
 ) -> dict[str, theme.Picture]:
     """All pictures by name; ``run`` is the scene, ``step`` the step of the current, ``moved`` the move."""
     drawn = {}
@@ -34,6 +41,8 @@ def draw(
         drawn["current_step"] = current_step(drive, step)
         drawn["ripple"] = ripple(rippled)
         drawn["loops"] = bode(loops)
+        drawn["speed_range"] = speed_range(drive, reached)
+        drawn["circles"] = circles(drive, reached)
         if moved is not None:
             drawn["position"] = position(drive, moved)
     return drawn
@@ -110,6 +119,37 @@ def voltage(drive: Drive, run: Run) -> theme.Picture:
     need = scenes.voltage(drive, drive.machine.rated_speed_rad_s, drive.machine.rated_current_a)
     caption = f"Voltage that the regulators ask for, and the largest that the bus can give. {at} need {need:.4g} V."
     return theme.picture("voltage", figure, caption)
+
+
+def speed_range(drive: Drive, reached: SpeedRange) -> theme.Picture:
+    """Largest torque over speed, with the torque table and with i_d = 0."""
+    has, without = ("-", "--") if drive.core.references else ("--", "-")
+    figure, axis = theme.axes(height=2.6)
+    axis.plot(reached.speed / RPM, reached.with_table, color=theme.AFTER, linestyle=has)
+    axis.plot(reached.speed / RPM, reached.without, color=theme.BEFORE, linestyle=without)
+    axis.axvline(drive.machine.rated_speed_rad_s / RPM, color=theme.BAND, linewidth=0.8, zorder=0)
+    axis.set(title="Torque over speed", xlabel="rpm", ylabel="Nm", xlim=(0.0, reached.speed[-1] / RPM), ylim=(0, None))
+    theme.key(axis, ("with the torque table", theme.AFTER), ("with $i_d = 0$", theme.BEFORE))
+    state = "has the torque table" if drive.core.references else "has i_d = 0 ([core] references = false)"
+    said = "Largest torque by the nameplate within current limit and voltage circle, up to the speed that trips."
+    return theme.picture("speed_range", figure, f"{said} This drive {state}; the line is its rated speed.")
+
+
+def circles(drive: Drive, reached: SpeedRange) -> theme.Picture:
+    """The current circle, the voltage limit at three speeds, the points of the table."""
+    figure, axis = theme.axes(height=3.4)
+    limit, turn = drive.current_limit_a, np.linspace(0.0, 2.0 * np.pi, 181)
+    axis.plot(limit * np.cos(turn), limit * np.sin(turn), color=theme.AXIS, linestyle=":")
+    speeds = [speed for speed in (reached.base(), reached.speed[-1]) if speed > 0.0]
+    for speed in speeds:
+        axis.plot(*reached.ellipse(speed), color=theme.RECORDED, linewidth=0.9)
+    axis.plot(*reached.mtpa.T, color=theme.BEFORE)
+    axis.plot(*reached.points.T, ".-", color=theme.AFTER, markersize=3)
+    axis.set(title="Both circles", xlabel="$i_d$ [A]", ylabel="$i_q$ [A]", xlim=(-1.6 * limit, 1.1 * limit))
+    axis.set(ylim=(-0.15 * limit, 1.15 * limit), aspect="equal")
+    theme.key(axis, ("least current", theme.BEFORE), ("largest torque over speed", theme.AFTER))
+    at = " and ".join(f"{speed / RPM:.4g} rpm" for speed in speeds)
+    return theme.picture("circles", figure, f"Current limit (dotted), voltage limit (grey) at {at}.")
 
 
 def current_step(drive: Drive, step: Run) -> theme.Picture:

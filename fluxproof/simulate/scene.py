@@ -16,6 +16,7 @@ from fluxproof.cosim.scenarios import RPM, scenario
 from fluxproof.plant.transforms import linear_limit
 from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError
+from golden_model.formats import PU
 from golden_model.protection_limits import regen_end_v
 from golden_model.scaling import speed_gains
 from golden_model.units import from_si
@@ -60,6 +61,14 @@ class Scene:
 def torque_per_a(drive: Drive) -> float:
     """Torque of 1 A of i_q at i_d = 0 [Nm/A]."""
     return 1.5 * drive.machine.pole_pairs * drive.machine.magnet_flux_wb
+
+
+def torque_code(drive: Drive, i_q: float) -> int:
+    """i_q_ext for a current [A]; with the torque table it is a torque, that of this current at i_d = 0."""
+    if not drive.core.references:
+        return int(from_si("i_q_ext", i_q, drive))
+    asked = torque_per_a(drive) * i_q / drive.torque_base_nm / PU.lsb
+    return int(np.clip(round(asked), PU.lo, PU.hi))
 
 
 def voltage(drive: Drive, omega_m: float, i_q: float) -> float:
@@ -196,6 +205,9 @@ def _current_step(drive: Drive, speed: float) -> Scene:
     size = STEP_OF_LIMIT * drive.current_limit_a
     i_q = np.repeat([0.0, size], STEP_SAMPLES)
     driven = replace(_driven(drive, np.full(len(i_q), speed), i_q), omega_m=speed)
+    if drive.core.references:  # the step is one of the current regulators, without the table
+        codes = np.array([from_si("i_q_ext", value, drive) for value in i_q], np.int64)
+        driven = replace(driven, i_q_ext=codes, changes={0: {"use_table": 0}})
     stages = (Stage("before", 0, STEP_SAMPLES, 0.0), Stage("current step", STEP_SAMPLES, 2 * STEP_SAMPLES, size))
     return Scene(driven, stages, imposed=True)
 
@@ -209,7 +221,7 @@ def _driven(drive: Drive, speed: np.ndarray, i_q: np.ndarray) -> Scenario:
         load=speed.astype(float),
         u_dc=np.full(n, drive.inverter.dc_bus_v),
         i_d_ref=zeros,
-        i_q_ext=np.array([from_si("i_q_ext", value, drive) for value in i_q], np.int64),
+        i_q_ext=np.array([torque_code(drive, value) for value in i_q], np.int64),
         speed_mode=zeros,
         enable=ones,
     )

@@ -11,10 +11,12 @@ import numpy as np
 from fluxproof.simulate import figures, page, verdict
 from fluxproof.simulate.margins import current_loop, margins, speed_loop, turning_current_loop
 from fluxproof.simulate.move import move_scene, of_move
-from fluxproof.simulate.regeneration import Regeneration, regeneration, told
+from fluxproof.simulate.regeneration import Regeneration, regeneration, told, trip_v
 from fluxproof.simulate.ripple import ripple
 from fluxproof.simulate.run import Run, run
 from fluxproof.simulate.scene import current_step, fast_current_step, fastest, main_scene
+from fluxproof.simulate.speed_range import speed_range
+from fluxproof.simulate.trip import beyond, of_trip, top_speed, trip, unjudged
 from golden_model.board_registers import core_changes
 from golden_model.drive import Drive
 from golden_model.registers import RegisterSet, registers
@@ -42,11 +44,17 @@ def simulate(
     if outer is not None:
         loops["speed loop"] = outer
     found = {loop: margins(value) for loop, value in loops.items()}
+    reached = speed_range(drive, top_speed(register_set, drive))
     say("ripple")
     loaded = main.scene.stages[2]
     rippled = ripple(drive, main, loaded.end, _turn(drive, main, loaded.end))
     back = regeneration(drive, _untripped(drive, register_set, main))
-    status, reason = verdict.judge(drive, found, [step, fast, main, *([] if moved is None else [moved])])
+    tripped = trip(drive, register_set)
+    runs = [step, fast, main, *([] if moved is None else [moved])]
+    highest = max(float(each["true_u_dc"].max()) for each in runs)
+    status, reason = verdict.judge(drive, found, runs, beyond(drive, tripped, highest))
+    if status == "ok":
+        reason = "; ".join(filter(None, (reason, unjudged(drive, tripped))))
     if status == "tripped" and "u_dc_high" in main.faults:
         reason = f"{reason}: {told(drive, back)}"
     data = {
@@ -61,6 +69,8 @@ def simulate(
         "not_modelled": verdict.not_modelled(drive, [main], plant),
     }
 
+    data["figures"]["Speed range"] = reached.figures()
+    data["figures"]["Trip at the top speed"] = of_trip(drive, tripped, trip_v(drive))
     if moved is not None:
         data["figures"]["Position"] = of_move(drive, moved)
         data["move"] = [_stage(drive, stage) for stage in moved.scene.stages]
@@ -69,7 +79,7 @@ def simulate(
         from fluxproof.simulate import pictures  # matplotlib takes a second
 
         say("report")
-        return page.render(data, drive, pictures.draw(drive, main, step, loops, rippled, moved))
+        return page.render(data, drive, pictures.draw(drive, main, step, loops, rippled, reached, moved))
 
     return data, pages
 

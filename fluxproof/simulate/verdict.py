@@ -23,8 +23,8 @@ LEARNT = 0.8  # of the loss of dead time and devices
 OF_SPEED, OF_CURRENT = 0.03, 0.1  # largest error of a settled stage: of the rated speed, rms of the current limit
 
 
-def judge(drive: Drive, loops: dict[str, Margins], runs: list[Run]) -> tuple[str, str]:
-    """(status, reason): "ok", "unstable", "tripped" or "not_settled"; the first that applies, loops first."""
+def judge(drive: Drive, loops: dict[str, Margins], runs: list[Run], overvoltage: str = "") -> tuple[str, str]:
+    """(status, reason): "ok", "unstable", "tripped", "not_settled" or "overvoltage"; the first that applies."""
     for name, margins in loops.items():
         if not margins.stable:
             size = f"a pole of the closed loop has the magnitude {margins.pole:.4f}"
@@ -38,6 +38,8 @@ def judge(drive: Drive, loops: dict[str, Margins], runs: list[Run]) -> tuple[str
         reason = unsettled(drive, run)
         if reason:
             return "not_settled", reason
+    if overvoltage:
+        return "overvoltage", overvoltage
     slow = min(loops, key=lambda name: _or(loops[name].phase_margin_deg))
     margin = loops[slow].phase_margin_deg
     least = "" if margin is None else f"; least phase margin {margin:.0f} degrees, {slow}"

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /* The bus of docs/software/fluxproof_bus.h as a memory with an A/B/Z encoder in it, for find_index of bring_up.c: the flag
  * of the index comes FLUXPROOF_INDEX_AFTER looks at it with a field that turns, and never if that is 0.  Gates that are
- * enabled without an angle, its own or a forced one, end the program with status 9. */
+ * enabled without an angle, its own or a forced one, end the program with status 9, a current of the d axis while the
+ * torque table is in force with status 8.  The torque is i_q_ext with the table, that of i_q and the magnets without. */
 
 #include "fluxproof_bus.h"
 #include "fluxproof_registers.h"
@@ -39,7 +40,14 @@ bool bus_write(uint32_t offset, uint32_t value)
     words[offset / 4] = value;
     if (words[AT(enable) / 4] && !known() && !words[AT(position_source) / 4])
         exit(9);
+    if (offset == AT(i_d_ref) && value && words[AT(use_table) / 4])
+        exit(8);
     return true;
+}
+
+static double flux(void)
+{
+    return 1.5 * words[AT(pole_pairs) / 4] * words[AT(lambda_mg) / 4] / 65536.0 * FLUXPROOF_BASE_FLUX_WB;
 }
 
 bool bus_read(uint32_t offset, uint32_t *value)
@@ -53,7 +61,13 @@ bool bus_read(uint32_t offset, uint32_t *value)
         *value = generic(offset);
     else if (offset == AT(flags))
         *value = words[AT(enable) / 4] ? FLUXPROOF__FLAGS__RUNNING_bm : 0;
-    else if (offset == AT(encoder_flags)) {
+    else if (offset == AT(i_q) && !words[AT(use_table) / 4])
+        *value = words[AT(i_q_ext) / 4];
+    else if (offset == AT(torque)) {
+        double current = (int32_t)words[AT(i_q_ext) / 4] * FLUXPROOF_BASE_CURRENT_A;
+        double made = current * flux() / FLUXPROOF_BASE_TORQUE_NM;
+        *value = words[AT(use_table) / 4] ? words[AT(i_q_ext) / 4] : (uint32_t)(int32_t)made;
+    } else if (offset == AT(encoder_flags)) {
         looks += words[AT(forced_rate) / 4] != 0 && words[AT(i_d_ref) / 4] != 0;
         *value = known();
     }

@@ -158,8 +158,9 @@ def where_they_part(run: Run, cause: Cause, state, first: int, row: int) -> tupl
             low = middle + 1
     ours, theirs = run.state_at(state, first, low), cause.run.state_at(cause.state, first, low)
     for k in range(low, row + 1):
-        a = trace(ours, run.sample(k), run.registers, run.config, run.of_speed(k))
-        b = trace(theirs, cause.run.sample(k), cause.run.registers, run.config, cause.run.of_speed(k))
+        a = trace(ours, run.sample(k), run.registers_at(k), run.config, run.of_speed(k), run.table)
+        other = cause.run
+        b = trace(theirs, other.sample(k), other.registers_at(k), run.config, other.of_speed(k), run.table)
         apart = [name for name in parted(a, b) if name != "latch"]
         if apart:
             return k, apart[0]
@@ -172,7 +173,7 @@ def golden_value(run: Run, state, row, name) -> int:
 
     state: the one before the row.
     """
-    said = trace(state, run.sample(row), run.registers, run.config, run.of_speed(row))[OWNER[name]]
+    said = trace(state, run.sample(row), run.registers_at(row), run.config, run.of_speed(row), run.table)[OWNER[name]]
     return said[outputs_of(OWNER[name]).index(name)] if said else 0
 
 

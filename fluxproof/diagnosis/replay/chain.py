@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from golden_model import fluxproof
+from golden_model.control.reference_table import BLANK
 from golden_model.kernel import kernel
 
 FIELDS = fluxproof.Observed._fields
@@ -23,7 +24,7 @@ def given_of(registers, given, k):
 
 
 @kernel
-def run_until_different(state, samples, given, registers, config, recorded, column, start, stop, wrong):
+def run_until_different(state, samples, given, registers, config, table, recorded, column, start, stop, wrong):
     """Replay rows start..stop-1: (row of the first difference or stop, state before that row).
 
     samples (n, 13), recorded (n, m) int64; column (m,) int64: index in ``recorded`` of each of Observed, -1 if it
@@ -33,7 +34,7 @@ def run_until_different(state, samples, given, registers, config, recorded, colu
         x = samples[k]
         sample = fluxproof.Sample(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12])
         of_speed = given_of(registers, given, k)
-        following, out = fluxproof.step_given(state, sample, registers, config, of_speed)
+        following, out = fluxproof.step_table(state, sample, registers, config, of_speed, table)
         different = False
         for n, value in enumerate(out):
             if column[n] >= 0 and recorded[k, column[n]] != value:
@@ -46,13 +47,14 @@ def run_until_different(state, samples, given, registers, config, recorded, colu
 
 
 @kernel
-def count_differences(state, samples, given, registers, config, recorded, column, start, stop, last):
+def count_differences(state, samples, given, registers, config, table, recorded, column, start, stop, last):
     """Replay rows start..stop-1 and count the values that differ; ``last`` (1,) receives the last such row."""
     count = 0
     for k in range(start, stop):
         x = samples[k]
         sample = fluxproof.Sample(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12])
-        state, out = fluxproof.step_given(state, sample, registers, config, given_of(registers, given, k))
+        of_speed = given_of(registers, given, k)
+        state, out = fluxproof.step_table(state, sample, registers, config, of_speed, table)
         for n, value in enumerate(out):
             if column[n] >= 0 and recorded[k, column[n]] != value:
                 count += 1
@@ -71,39 +73,63 @@ class Run(NamedTuple):
     config: fluxproof.Config
     given: np.ndarray  # (n, 3) int64, fluxproof.Given of each row where it was recorded, else (0, 3)
     patch: tuple | None = None
+    table: np.ndarray = BLANK  # words of the torque table
+    changes: tuple[tuple[int, dict[str, int]], ...] = ()  # (row, registers from there on), rows rising
 
     def until_different(self, state, start, stop):
         """(row of the first difference or ``stop``, state before it, names that differ there)."""
         wrong = np.zeros(len(self.names), np.int64)
-        row, state = self._run(run_until_different, state, self.column, start, stop, wrong)
+        row = start
+        for begin, end, registers in self._stretches(start, stop):
+            row, state = self._run(run_until_different, state, registers, self.column, begin, end, wrong)
+            if row < end:
+                break
         return int(row), plain_state(state), [n for n, bad in zip(self.names, wrong, strict=True) if bad]
 
     def differences(self, state, start, stop):
         """(number of values that differ in start..stop-1, last row with a difference or -1)."""
-        last = np.full(1, -1, np.int64)
-        return int(self._run(count_differences, state, self.column, start, stop, last)), int(last[0])
+        last, count = np.full(1, -1, np.int64), 0
+        for begin, end, registers in self._stretches(start, stop):
+            found = self._run(count_differences, state, registers, self.column, begin, end, last)
+            count += int(found)
+            if end < stop:
+                state = self.state_at(state, begin, end)
+        return count, int(last[0])
 
     def state_at(self, state, start, row) -> fluxproof.State:
         """The golden state before ``row`` of a run that starts with ``state`` before ``start``."""
         blind, wrong = np.full(len(FIELDS), -1, np.int64), np.zeros(len(self.names), np.int64)
-        return plain_state(self._run(run_until_different, state, blind, start, row, wrong)[1])
+        for begin, end, registers in self._stretches(start, row):
+            _, state = self._run(run_until_different, state, registers, blind, begin, end, wrong)
+        return plain_state(state)
 
-    def _run(self, function, state, column, start, stop, out):
+    def registers_at(self, row) -> fluxproof.Registers:
+        """The registers in force in a row."""
+        return self.registers._replace(**{k: v for at, new in self.changes if at <= row for k, v in new.items()})
+
+    def _stretches(self, start, stop):
+        """(first row, end, registers in force) of the rows start..stop-1."""
+        ends = [row for row, _ in self.changes if start < row < stop]
+        for begin, end in zip([start, *ends], [*ends, stop], strict=True):
+            yield begin, end, self.registers_at(begin)
+
+    def _run(self, function, state, registers, column, start, stop, out):
         """Call a kernel with the patch in place."""
         if self.patch is None:
             return function(
-                state, self.samples, self.given, self.registers, self.config, self.recorded, column, start, stop, out
-            )
+                state, self.samples, self.given, registers, self.config, self.table, self.recorded, column, start,
+                stop, out,
+            )  # fmt: skip
         row, field, value = self.patch
         kept, self.samples[row, field] = self.samples[row, field], value
         try:
-            return self._replace(patch=None)._run(function, state, column, start, stop, out)
+            return self._replace(patch=None)._run(function, state, registers, column, start, stop, out)
         finally:
             self.samples[row, field] = kept
 
     def of_speed(self, row) -> fluxproof.Given:
         """What the speed of one row came from."""
-        return fluxproof.Given(*map(int, given_of.py_func(self.registers, self.given, row)))
+        return fluxproof.Given(*map(int, given_of.py_func(self.registers_at(row), self.given, row)))
 
     def sample(self, row) -> fluxproof.Sample:
         """One row as the core's input."""
@@ -113,8 +139,11 @@ class Run(NamedTuple):
         return fluxproof.Sample(*values)
 
 
-def run_of(samples, observed: dict, registers: dict, config: dict) -> Run:
-    """A Run from a dump's ``meta``; ``observed`` {name: (n,)} may contain any of the core's signals."""
+def run_of(samples, observed: dict, registers: dict, config: dict, table=None, changes=()) -> Run:
+    """A Run from a dump's ``meta``; ``observed`` {name: (n,)} may contain any of the core's signals.
+
+    ``table``: words of the torque table; ``changes``: [(row, {register: integer})], rows rising.
+    """
     names = tuple(name for name in FIELDS if name in observed)
     column = np.array([names.index(name) if name in names else -1 for name in FIELDS], np.int64)
     recorded = np.ascontiguousarray(np.stack([observed[name] for name in names], axis=1), np.int64)
@@ -122,7 +151,9 @@ def run_of(samples, observed: dict, registers: dict, config: dict) -> Run:
     defaults = fluxproof.Config._field_defaults  # a dump of an older core does not know every generic
     generics = fluxproof.Config(**{name: int(config.get(name, value)) for name, value in defaults.items()})
     given = _given(observed, values)
-    return Run(np.array(samples, np.int64, order="C"), recorded, names, column, values, generics, given)
+    words = BLANK if table is None else table
+    rows = np.array(samples, np.int64, order="C")
+    return Run(rows, recorded, names, column, values, generics, given, None, words, tuple(changes))
 
 
 def _given(observed: dict, values: fluxproof.Registers) -> np.ndarray:

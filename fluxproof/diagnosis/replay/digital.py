@@ -41,7 +41,8 @@ def replay(recording: Recording) -> tuple[Digital, list[str]]:
     """(result.Digital, sentences for the report) of a recording with the core's inputs and outputs.
 
     Uses ``recording.meta`` as telemetry.read_dump makes it: ``registers``, ``config`` and ``samples`` at least;
-    ``observed``, or the duty columns as the core's compare values; ``start``, ``first_state``, ``gaps``.
+    ``observed``, or the duty columns as the core's compare values; ``start``, ``first_state``, ``gaps``, ``table``,
+    ``changes``.
     ``first_difference`` has block, instance, sample (row), counter, signal, bit, recorded, golden (as hexadecimal
     and, with unit, in SI), differing (all signals of that row), hidden (blocks upstream without recorded outputs) and
     cause (or None).  ``checked`` is False if no sample of the whole core could be compared; ``samples`` is the
@@ -56,13 +57,14 @@ def replay(recording: Recording) -> tuple[Digital, list[str]]:
     lacking = [name for name in fluxproof.Registers._fields if name not in meta["registers"]]
     if lacking:
         return Digital(), [f"The digital part was not checked: register {lacking[0]} is not in the recording."]
-    if meta["config"].get("references", 0) and meta["registers"]["use_table"]:
+    if meta["config"].get("references", 0) and meta["registers"]["use_table"] and meta.get("table") is None:
         return Digital(), ["The digital part was not checked: the recording does not hold the core's torque table."]
-    if meta["config"].get("position_loop", 0) and meta["registers"]["position_mode"]:
+    told = meta.get("changes") is not None
+    if meta["config"].get("position_loop", 0) and meta["registers"]["position_mode"] and not told:
         return Digital(), [
             "The digital part was not checked: the recording does not hold the targets of position mode."
         ]
-    if meta["config"].get("modes", 0) and meta["registers"]["voltage_mode"]:
+    if meta["config"].get("modes", 0) and meta["registers"]["voltage_mode"] and not told:
         return Digital(), [
             "The digital part was not checked: the recording does not hold the voltages of voltage mode."
         ]
@@ -71,7 +73,9 @@ def replay(recording: Recording) -> tuple[Digital, list[str]]:
         return Digital(), [
             "The digital part was not checked: the recording has no output of the core, not even duties."
         ]
-    run = run_of(meta["samples"], observed, meta["registers"], meta["config"])
+    run = run_of(
+        meta["samples"], observed, meta["registers"], meta["config"], meta.get("table"), meta.get("changes") or ()
+    )
     notes = [f"The dump's header was changed after it was written: {what}." for what in meta.get("altered", [])]
     misfit = _not_of_its_format(run)
     if misfit is not None:

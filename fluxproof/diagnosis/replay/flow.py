@@ -101,12 +101,12 @@ class _Listener:
         return result
 
 
-def trace(state, sample, registers, config, of_speed=None) -> dict[str, tuple]:
+def trace(state, sample, registers, config, of_speed=None, table=BLANK) -> dict[str, tuple]:
     """{instance: its outputs} of one sample, hidden ones included; ``latch`` is the sample itself.
 
     The top's step runs as plain Python with listeners instead of the blocks.  The calls of a block that is used
     several times are in the order of WIRING.  An instance that the generics leave out has no outputs.
-    ``of_speed``: fluxproof.Given of the sample; the registers' if none.
+    ``of_speed``: fluxproof.Given of the sample; the registers' if none; ``table``: the words of the torque table.
     """
     notes = defaultdict(list)
     estimators = types.SimpleNamespace(**vars(estimation))
@@ -115,7 +115,7 @@ def trace(state, sample, registers, config, of_speed=None) -> dict[str, tuple]:
     r = registers
     of_speed = of_speed or fluxproof.Given(r.speed_given, r.omega_given, r.position_restart, r.emf_samples)
     step = _overheard(fluxproof.step_table.py_func, notes, estimation=estimators)
-    step(state, sample, registers, config, of_speed, BLANK)
+    step(state, sample, registers, config, of_speed, table)
     said = {}
     for instance, (module, _) in fluxproof.WIRING.items():
         given = notes[module].pop(0) if notes[module] else ()

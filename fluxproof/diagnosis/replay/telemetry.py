@@ -32,7 +32,9 @@ from fluxproof.diagnosis.replay.telemetry_columns import columns_of
 from fluxproof.files import write_bytes
 from fluxproof.quote import shown
 from golden_model import fluxproof
+from golden_model.control.reference_table import BLANK
 from golden_model.drive_checks import CARRIER_HALF_RANGE
+from golden_model.formats import PU
 from golden_model.io import sample_latch
 from golden_model.kernel import CACHE_DIR
 from golden_model.units import si_per_lsb, unit
@@ -62,7 +64,7 @@ def is_dump(path) -> bool:
         return False
 
 
-def write_dump(path, drive, register_set, samples, observed, first_state=None, counter=None) -> Path:
+def write_dump(path, drive, register_set, samples, observed, first_state=None, counter=None, changes=None) -> Path:
     """Write a dump atomically; returns the path.
 
     drive: golden_model.drive.Drive.  register_set: its registers and generics.
@@ -70,6 +72,8 @@ def write_dump(path, drive, register_set, samples, observed, first_state=None, c
     observed: {name of fluxproof.Observed: (n,) integers}, any of them.
     first_state: fluxproof.State before the first sample; None means the reset state if the counter starts at 0, else
     unknown.  counter: (n,) samples since reset, default 0, 1, ...; a jump means lost samples.
+    changes: {number of a sample: {register: integer}}, what the host wrote while the drive ran; None: not known, so
+    that a drive in position or voltage mode cannot be replayed.  The words of the torque table are register_set's.
     """
     if isinstance(samples, dict):
         samples = np.stack([samples[name] for name in fluxproof.Sample._fields], axis=1)
@@ -82,7 +86,7 @@ def write_dump(path, drive, register_set, samples, observed, first_state=None, c
         rows[name] = samples[:, column]
     for name in names:
         rows[name] = observed[name]
-    header = _header(drive, register_set, names, len(samples), first_state)
+    header = _header(drive, register_set, names, len(samples), first_state, changes)
     text = json.dumps(header).encode()
     return write_bytes(Path(path), MAGIC + struct.pack("<I", len(text)) + text + rows.tobytes())
 
@@ -93,7 +97,8 @@ def read_dump(path) -> tuple[dict[str, np.ndarray], dict]:
     meta: ``telemetry`` (the header), ``registers`` {name: integer}, ``config`` {generic: integer}, ``samples`` (n, 13)
     int64 in the order of fluxproof.Sample, ``observed`` {name: (n,) int64}, ``counter`` (n,) int64, ``start``
     ("reset", "state" or "unknown"), ``first_state`` (fluxproof.State or None), ``gaps`` [(row, samples lost before
-    it)], ``scales`` {field: SI per LSB}, ``altered`` [parts changed after writing], ``sample_time_s``.
+    it)], ``table`` (words of the torque table, or None), ``changes`` ([(row, {register: integer})], or None),
+    ``scales`` {field: SI per LSB}, ``altered`` [parts changed after writing], ``sample_time_s``.
     """
     path = Path(path)
     try:
@@ -121,7 +126,7 @@ def _record(names):
     return np.dtype([("counter", "<u4"), *((name, "<i4") for name in names)])
 
 
-def _header(drive, register_set, names, count, first_state) -> dict:
+def _header(drive, register_set, names, count, first_state, changes) -> dict:
     """The header without the samples; ``si_per_lsb`` converts a field's integers to its unit."""
     ports = INPUTS | OBSERVED
 
@@ -147,6 +152,10 @@ def _header(drive, register_set, names, count, first_state) -> dict:
         "registers": register_set.values._asdict(),
         "first_state": None if first_state is None else [list(p) if isinstance(p, tuple) else p for p in first_state],
     }
+    if register_set.config.references and register_set.values.use_table:
+        header["table"] = register_set.table.tolist()
+    if changes is not None:
+        header["changes"] = [[number, changes[number]] for number in sorted(changes)]
     header = json.loads(json.dumps(header, default=int))
     return header | {"checksum": _checksums(header)}
 
@@ -233,12 +242,35 @@ def _check_names(path, header):
     missing = [name for name in fluxproof.REGISTERS if name not in header["registers"]]
     if missing:
         raise RecordingError(f"{path}: header: register {missing[0]} is missing")
+    _check_written(path, header)
     if header["samples"] < 1:
         raise RecordingError(f"{path}: the dump contains no samples")
     try:
         _state(header.get("first_state"))
     except (TypeError, ValueError):
         raise RecordingError(f"{path}: header: first_state is not a state of the core") from None
+
+
+def _check_written(path, header):
+    """The torque table and the changes of registers, which a dump may have."""
+    if (table := header.get("table")) is not None:
+        try:
+            words = np.array(table)
+        except ValueError:  # of unequal lengths
+            words = np.zeros(0)
+        if words.shape != BLANK.shape or words.dtype.kind != "i" or words.min() < PU.lo or words.max() > PU.hi:
+            raise RecordingError(f"{path}: header: table is not one of {BLANK.shape[0]} x {BLANK.shape[1]} words")
+    changes = header.get("changes", [])
+    if type(changes) is not list or not all(_is_change(change) for change in changes):
+        raise RecordingError(f"{path}: header: changes are not pairs of a sample's number and registers")
+
+
+def _is_change(change) -> bool:
+    """Whether it is [number, {register: 32-bit integer}]."""
+    if type(change) is not list or [type(part) for part in change] != [int, dict] or change[0] < 0:
+        return False
+    whole = all(type(v) is int and -(2**31) <= v < 2**31 for v in change[1].values())
+    return whole and set(change[1]) <= set(fluxproof.REGISTERS)
 
 
 def _integers(values: list) -> list:
@@ -266,6 +298,11 @@ def _state(nested):
     return fluxproof.State(*parts)
 
 
+def _number(change) -> int:
+    """The sample's number of a change."""
+    return change[0]
+
+
 def _meta(header, rows, names) -> dict:
     """The ``meta`` of read_dump."""
     counter = rows["counter"].astype(np.int64)
@@ -273,6 +310,9 @@ def _meta(header, rows, names) -> dict:
     counter = counter[0] + np.concatenate(([0], np.cumsum(step)))
     first_state = _state(header.get("first_state"))
     start = "state" if first_state is not None else "reset" if counter[0] == 0 else "unknown"
+    changes = header.get("changes")
+    if changes is not None:
+        changes = [(int(np.searchsorted(counter, number)), dict(new)) for number, new in sorted(changes, key=_number)]
     same = header["checksum"].get("judged") == _checksums(header)["judged"]
     return {
         "telemetry": header,
@@ -283,6 +323,8 @@ def _meta(header, rows, names) -> dict:
         "counter": counter,
         "start": start,
         "first_state": first_state,
+        "table": None if "table" not in header else np.array(header["table"], np.int64),
+        "changes": changes,
         "gaps": [(int(k) + 1, int(step[k]) - 1) for k in np.flatnonzero(step != 1)],
         "scales": {entry["name"]: entry["si_per_lsb"] for entry in header["fields"]},
         "altered": [] if same else ["the checksum of registers or start state is wrong"],

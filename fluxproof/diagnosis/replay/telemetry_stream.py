@@ -176,8 +176,8 @@ def _why_nothing(raw: bytes) -> str:
     return f"no telemetry packet: no word 0x{HEADER_WORD:08x} starts a valid packet of {SIZE} bytes"
 
 
-def write_piece(path, piece: Piece, drive, register_set) -> Path:
+def write_piece(path, piece: Piece, drive, register_set, changes=None) -> Path:
     """Write the dump of one piece; arguments as of telemetry.write_dump."""
     samples = {name: piece.fields[name] for name in Sample._fields}
     observed = {name: piece.fields[name] for name in PACKET}
-    return write_dump(path, drive, register_set, samples, observed, counter=piece.counter)
+    return write_dump(path, drive, register_set, samples, observed, counter=piece.counter, changes=changes)
