@@ -3,6 +3,7 @@
 --   mode       = position, else speed, else voltage with voltage_mode, else torque
 --   by_voltage = the mode is voltage: the host's voltage takes the place of the current regulators'
 --   take_over  = speed or position mode, and the sample before had another mode
+--              = position mode, and the sample before was its first: the torque of its trajectory begins here
 --   follows    = the voltage of this sample or of the one before is the host's
 -- Formats: bits.  Latency: 1.  Rounding: none.
 
@@ -35,6 +36,7 @@ architecture rtl of mode_change is
 
   signal mode_0 : mode_t;
   signal mode   : mode_t;  -- of the last sample
+  signal fresh  : std_logic;  -- it was the first of position mode
 begin
   mode_0 <= POSITION when by_position = '1' else
             SPEED when speed_mode = '1' else
@@ -50,13 +52,15 @@ begin
       if in_valid = '1' then
         mode       <= mode_0;
         by_voltage <= '1' when mode_0 = VOLTAGE else '0';
-        take_over  <= '1' when mode_0 >= SPEED and mode_0 /= mode else '0';
+        fresh      <= '1' when mode_0 = POSITION and mode /= POSITION else '0';
+        take_over  <= '1' when mode_0 >= SPEED and (mode_0 /= mode or (mode_0 = POSITION and fresh = '1')) else '0';
         follows    <= '1' when mode_0 = VOLTAGE or mode = VOLTAGE else '0';
       end if;
 
       if rst = '1' then
         out_valid <= '0';
         mode      <= TORQUE;
+        fresh     <= '0';
       end if;
     end if;
   end process;

@@ -172,15 +172,17 @@ def test_a_few_lost_rows_are_left_as_gaps(tmp_path, nominal):
     assert codes(recording) == ["gap"] and len(recording) == 3997
 
 
-def test_references_beyond_the_voltage_limit_are_not_at_the_machine(tmp_path, nominal):
+@pytest.mark.parametrize("times, words", [(1.2, "ask for more than the bus gives"), (1.1, "up to six-step")])
+def test_references_beyond_the_voltage_limit_are_not_at_the_machine(tmp_path, nominal, times, words):
     """A regulator that is not limited asks for more than the bus gives: its rows are set aside and told."""
     table = dq_made()
     most = table["u_dc"] / np.sqrt(3.0)
     beyond = slice(600, 700)
-    table["u_q_ref"][beyond] = 1.2 * most[beyond]
+    table["u_q_ref"][beyond] = times * most[beyond]
     recording = load_recording(write(tmp_path / "r.parquet", table), nominal)
     found = [p for p in recording.problems if p.code == "voltage_limit"]
     assert len(found) == 1 and (found[0].row, found[0].count) == (600, 100) and not recording.fatal
+    assert words in found[0].message
     assert not recording.usable[599:701].any() and recording.usable[:590].any()
 
 

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rows at the voltage limit: the references ask for more than the bus can give, so that they are not at the machine.
 
-An inverter gives at most u_dc / sqrt(3) without overmodulation.  A regulator that is not limited asks for more while
-the current lags behind.  References that lie beyond in most rows have another unit or scale, which other
-checks find.
+An inverter gives at most u_dc / sqrt(3) without over-modulation.  A regulator that is not limited asks for more while
+the current lags behind.  With over-modulation there is more, up to six-step, 6/pi/sqrt(3) = 1.10 times that; then
+the fifth and seventh harmonic are at the machine too, and a row does not say how much of its reference was.  References
+that lie beyond in most rows have another unit or scale, which other checks find.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ STAGE = "channels"
 BEYOND = 1.03  # of u_dc / sqrt(3): noise and gain of the bus sensor
 BEYOND_NOMINAL = 1.2  # the same of a bus that was not recorded: a mains rectifier gives 10 % more than its rating
 MOST = 0.5  # share of rows
+SIX_STEP, WITHIN = 6.0 / np.pi / np.sqrt(3.0), 0.9  # of u_dc / sqrt(3), the same tolerance beyond; share of those rows
 LEAST = 3  # rows that follow each other: fewer are spikes
 
 
@@ -36,9 +38,16 @@ def check(recording, nominal) -> None:
     rows = mark(recording.usable, first, length, 1, 1)
     t = recording["t"]
     more = f" and in {counted(len(first) - 1, 'later part')}" if len(first) > 1 else ""
+    most = np.broadcast_to(SIX_STEP * BEYOND / np.sqrt(3.0) * u_dc, size.shape)
+    over = known and np.mean(size[beyond] <= most[beyond]) > WITHIN
+    why = (
+        "they are over-modulated, up to six-step, 1.10 times u_dc / sqrt(3), with harmonics that they lack"
+        if over
+        else "they ask for more than the bus gives, u_dc / sqrt(3)"
+    )
     message = (
         f"from {t[first[0]]:.6g} to {t[first[0] + length[0] - 1]:.6g} s{more} the voltage references are at the limit: "
-        "they ask for more than the bus gives, u_dc / sqrt(3)"
+        f"{why}"
     )
     fatal = not recording.usable.any()
     recording.problems.append(

@@ -44,7 +44,7 @@ def capture(drive, register_set, scenario: Scenario, machine=None, inverter=None
     state = _capture(
         state or fluxproof.State(), samples, np.asarray(scenario.u_dc, float), np.asarray(scenario.load, float),
         register_set.values, register_set.config, plant_state, params,
-        sensor_params(sensors or described_sensors(drive)), drive.sample_time_s, observed,
+        sensor_params(sensors or described_sensors(drive)), drive.sample_time_s, observed, register_set.table,
     )  # fmt: skip
     names = fluxproof.Observed._fields
     return samples, {name: observed[:, n].copy() for n, name in enumerate(names)}, state
@@ -52,7 +52,7 @@ def capture(drive, register_set, scenario: Scenario, machine=None, inverter=None
 
 @mixed_kernel
 def _capture(
-    state, samples, u_dc, load, registers, config, plant_state, params, sensors, period_s, observed
+    state, samples, u_dc, load, registers, config, plant_state, params, sensors, period_s, observed, table
 ):  # fmt: skip
     """Fill ``samples`` and ``observed`` with codes; the duties of a sample act in the next period."""
     duties = np.full(3, 0.5)
@@ -64,7 +64,8 @@ def _capture(
         x[3] = u_dc_code(sensors, u_dc[k], k)
         x[4] = position_code(sensors, plant_state[L.THETA_M], k)
         sample = fluxproof.Sample(x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12])
-        state, seen = fluxproof.step(state, sample, registers, config)
+        of_speed = fluxproof.given_by_registers(registers)
+        state, seen = fluxproof.step_table(state, sample, registers, config, of_speed, table)
         for n, value in enumerate(seen):
             observed[k, n] = value
         half = (1 - 2 * (k & 1)) * registers.double_update
