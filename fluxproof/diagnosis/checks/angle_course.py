@@ -56,9 +56,8 @@ def _drift(recording, nominal, change, turns) -> None:
     if (np.bincount(part, minlength=TWELFTHS) == 0).any():
         return
     # All parts of a turn count alike: an eccentric encoder that rises slowly and falls fast is falling in few rows.
-    within = np.array([np.median(each[part == n]) for n in range(TWELFTHS)])
-    rate = float(np.mean(within))
-    rates = [float(np.median(piece)) for piece in np.array_split(each - within[part] + rate, PARTS)]
+    rate = float(np.mean([np.median(each[part == n]) for n in range(TWELFTHS)]))
+    rates = [float(np.median(piece)) for piece in np.array_split(each, PARTS)]
     total = abs(rate) * np.abs(np.diff(shaft)).sum()
     if total < DRIFT * DEGREE or abs(rate) > MOST_DRIFT * DEGREE or max(abs(r / rate - 1.0) for r in rates) > ALIKE:
         return
