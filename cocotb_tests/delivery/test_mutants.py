@@ -103,10 +103,10 @@ def test_every_reason_is_of_a_block_that_is_mutated():
 
 def test_a_bit_inverted_where_words_differ_anyway_is_not_drawn():
     """n = 6: bit 0 inverted where bit 3, which 6 has not, is 1, or where bit 1 is 0; the other way round it matters."""
-    word = {"A": [2, 3, 4, 5], "B": ["0", "1", "1", "0"], "Y": [6]}
+    word = {"A": [2, 3, 4, 5], "B": ["0", "1", "1"], "Y": [6]}
     directions = {"A": "input", "B": "input", "Y": "output"}
-    module = {"cells": {"$eq$1": {"type": "$eq", "connections": word, "port_directions": directions}}}
-    module |= {"read": {6}, "inside": {}}
+    cell = {"type": "$eq", "connections": word, "port_directions": directions, "parameters": {"A_SIGNED": "0"}}
+    module = {"cells": {"$eq$1": cell}, "read": {6}, "inside": {}}
 
     def without_effect(mode: str, control: int) -> bool:
         place = f"mutate -mode {mode} -module m -cell $eq$1 -port A -portbit 0 -ctrlbit {control}"

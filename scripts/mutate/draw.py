@@ -87,8 +87,9 @@ def without_effect(module: dict, mutation: str) -> bool:
     if port in ports and ports[port]["bits"][int(bit)] not in read:
         return True
     if cell["type"] == "$eq" and mode in ("cnot0", "cnot1"):
-        other = cell["connections"]["AB".replace(port, "")]
-        return int(control) < len(other) and other[int(control)] == str(1 - int(mode[-1]))
+        other, signed = cell["connections"]["AB".replace(port, "")], int(cell["parameters"]["A_SIGNED"], 2)
+        beyond = "x" if signed else "0"
+        return [*other, *[beyond] * 64][int(control)] == str(1 - int(mode[-1]))
     return value == "x" or f"const{value}" == mode
 
 
