@@ -30,8 +30,13 @@ RPM = 30 / math.pi
 
 @pytest.fixture(scope="module")
 def drive():
-    """The paper's drive with fewer clocks per period: the same machine and registers, faster."""
-    return drives.with_carrier(drives.load(PAPER), 100)
+    """The paper's drive with fewer clocks per period, faster; its resolver has the motor's pole pairs.
+
+    The register pole_pairs is then 1, as with Hall sensors, and tells no program how fast the shaft turns.
+    """
+    drive = drives.with_carrier(drives.load(PAPER), 100)
+    sensors = dataclasses.replace(drive.sensors, position_pole_pairs=drive.machine.pole_pairs)
+    return dataclasses.replace(drive, sensors=sensors)
 
 
 @pytest.fixture(scope="module")

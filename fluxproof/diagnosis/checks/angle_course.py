@@ -63,7 +63,8 @@ def _drift(recording, nominal, change, turns) -> None:
         return
     turn(recording, -rate * shaft)
     per_turn, bits = rate / DEGREE, nominal.sensors.position_bits
-    counts = abs(per_turn) / (360.0 * nominal.machine.pole_pairs) * (2**bits if bits else 1.0)
+    turns = abs(per_turn) / (360.0 * nominal.machine.pole_pairs) * nominal.sensors.position_pole_pairs
+    counts = turns * (2**bits if bits else 1.0)
     size = f"{counts:.2g} counts of {2**bits}" if bits else f"{1e6 * counts:.0f} ppm of the counts"
     message = (
         f"the angle {'gains' if rate > 0 else 'loses'} {abs(per_turn):.3g} degrees electrical with every turn of the "
