@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The closed loop of core and motor in the RTL for as many periods as there is time: runs from reset, each with its speeds.
+"""The closed loop of core and motor in the RTL for as many periods as there is time, in runs from reset.
 
 python -m studies.hil.in_runs [PERIODS]
 
-A run that is finished is a line of build/studies/hil_runs.jsonl; a second call goes on behind the last one, and begins anew
-where the RTL is another.
+A finished run is a line of build/studies/hil_runs.jsonl, with its own speeds; a second call goes on behind the last
+one, and begins anew where the RTL is another.
 """
 
 from __future__ import annotations
