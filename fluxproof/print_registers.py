@@ -108,6 +108,8 @@ def c_lines(name: str, drive: Drive, result: RegisterSet) -> list[str]:
         "",
         "/* SI values of 1.0 per unit; peak values, electrical speed. */",
         *(f"#define FLUXPROOF_BASE_{key.upper()} {value!r}" for key, value in bases.items()),
+        "/* Electrical turns in a turn of the shaft; the register pole_pairs has those in a turn of the code. */",
+        f"#define FLUXPROOF_POLE_PAIRS {drive.machine.pole_pairs}",
         "/* Generics that the core must have been built with. */",
         *(f"#define FLUXPROOF_{key.upper()} {value}" for key, value in generics.items()),
         "",

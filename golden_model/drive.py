@@ -134,7 +134,10 @@ class Sensors:
     adc_bits: int = whole(12, 16, "of the current and bus converters")
     current_range_a: float = positive("A", "current at the upper end of the code, mid code is zero")
     u_dc_range_v: float = positive("V", "bus voltage at full code")
-    position_bits: int = whole(8, 18, "codes per mechanical turn")
+    position_bits: int = whole(8, 18, "codes per mechanical turn; of a resolver with several pole pairs, per its own")
+    position_pole_pairs: int = whole(
+        1, 63, "pole pairs of a resolver: turns of its code in one of the shaft; divides [machine] pole_pairs", 1
+    )
     current_offset_code: tuple | None = real("codes", "at zero current, mid code if none", None, count=3)
     current_gain: tuple = trim("negative for a reversed sensor", (1.0, 1.0, 1.0), 3, signed=True)
     current_sensors: int = whole(2, 3, "3, or 2: phase a has none, its current is minus the sum of the others", 3)
@@ -275,6 +278,11 @@ class Drive:
             choice.voltage_v or sensors.u_dc_range_v / 2,
             choice.omega_me_rad_s or machine.pole_pairs * machine.rated_speed_rad_s,
         )
+
+    @property
+    def code_pairs(self):
+        """Electrical turns in a turn of the position code: the pole pairs of the motor over those of a resolver."""
+        return self.machine.pole_pairs // self.sensors.position_pole_pairs
 
     @property
     def torque_base_nm(self):

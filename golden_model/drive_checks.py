@@ -120,6 +120,22 @@ def _low_side(drive):
         _refuse("[control] voltage_reserve", drive.control.voltage_reserve, f"at least {least:.4g} for {keys}: {why}")
 
 
+def _position_pairs(drive):
+    """The code of a resolver with several pole pairs repeats within a turn; it must tell the electrical angle."""
+    given, pairs, kind = drive.sensors.position_pole_pairs, drive.machine.pole_pairs, drive.encoder.kind
+    if given == 1:
+        return
+    key = "[sensors] position_pole_pairs"
+    if pairs % given:
+        allowed = [str(n) for n in range(1, pairs + 1) if pairs % n == 0]
+        why = f"a divisor of [machine] pole_pairs, {', '.join(allowed)}: else one code is several electrical angles"
+        _refuse(key, given, why)
+    if kind in ("abz", "hall"):
+        _refuse(key, given, f'1 with [encoder] kind = "{kind}", whose counts are those of a turn of the shaft')
+    if drive.core.position_loop:
+        _refuse(key, given, "1 with [core] position_loop, which counts turns of the code as those of the shaft")
+
+
 def _samples_per_turn(drive):
     """Flux models and chord integrate over a sample: its angle at the base of the speed is below half a radian."""
     rate, w = 1.0 / drive.sample_time_s, drive.bases.omega_me_rad_s
@@ -281,7 +297,7 @@ def _regeneration(drive):
 
 
 RULES = (
-    _sample_time, _sampling, _carrier, _pulses, _low_side, _samples_per_turn, _voltage, _current, _flux, _codes,
-    _trip_filter, _speed_loop, _current_loop, _flux_loop, _adaline_steps, _protection, _regeneration, _residual,
-    check_encoder, check_converters, check_position,
+    _sample_time, _sampling, _carrier, _pulses, _low_side, _position_pairs, _samples_per_turn, _voltage, _current,
+    _flux, _codes, _trip_filter, _speed_loop, _current_loop, _flux_loop, _adaline_steps, _protection, _regeneration,
+    _residual, check_encoder, check_converters, check_position,
 )  # fmt: skip

@@ -62,9 +62,9 @@ def protection(drive):
     finest, keys = 2.0**s.position_bits, "[sensors] position_bits"
     if drive.encoder.counts is not None:
         finest, keys = float(drive.encoder.counts), "[encoder] counts"
-    jump = JUMP_CODES / finest + JUMP_TURN
+    jump = JUMP_CODES / finest + s.position_pole_pairs * JUMP_TURN  # turns of the code
     if p.position_jump_rad is not None:
-        jump, keys = p.position_jump_rad / TURN_RAD, "[protection] position_jump_rad"
+        jump, keys = s.position_pole_pairs * p.position_jump_rad / TURN_RAD, "[protection] position_jump_rad"
     yield Entry("jump_max", jump, "turn", 1.0, keys)
     trips = [name in ALWAYS_REPORTED or getattr(p, f"trip_{name}") for name in NAMES]
     ignored = sum((not trip) << bit for bit, trip in enumerate(trips))

@@ -60,7 +60,8 @@ def sensing(drive):
     yield Entry("u_dc_gain", s.u_dc_gain * s.u_dc_range_v / 2.0, "V", b.voltage_v, keys)
     k_u_max = (1.0 - drive.control.voltage_reserve) / math.sqrt(3.0)
     yield Entry("k_u_max", k_u_max, "1", 1.0, "[control] voltage_reserve")
-    yield Entry("pole_pairs", drive.machine.pole_pairs, "1", 1.0, "[machine] pole_pairs")
+    keys = "[machine] pole_pairs; [sensors] position_pole_pairs"
+    yield Entry("pole_pairs", drive.code_pairs, "1", 1.0, keys)
     yield Entry("reverse", int(s.position_reverse), "1", 1.0, "[sensors] position_reverse")
     yield Entry("theta_offset", s.theta_offset_rad % TURN_RAD, "rad", TURN_RAD, "[sensors] theta_offset_rad")
 
@@ -69,7 +70,7 @@ def speed_loop(drive):
     """Speed from position codes, its filter and the speed regulator (gains zero without a bandwidth)."""
     c, m, b, t_s = drive.control, drive.machine, drive.bases, drive.sample_time_s
     base = base_keys(drive, "omega_me_rad_s")
-    k_speed = TURN_RAD * m.pole_pairs / t_s  # electrical rad/s per mechanical turn and sample
+    k_speed = TURN_RAD * drive.code_pairs / t_s  # electrical rad/s per turn of the code and sample
     yield Entry("k_speed", k_speed, "rad/s", b.omega_me_rad_s, f"[inverter] pwm_frequency_hz; {base}")
     base = base_keys(drive, "current_a", "omega_me_rad_s")
     k_filter = 1.0 if c.speed_filter_hz is None else -math.expm1(-TURN_RAD * c.speed_filter_hz * t_s)

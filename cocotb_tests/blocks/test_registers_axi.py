@@ -53,15 +53,16 @@ def test_generated_files_are_fresh(monkeypatch, tmp_path, capsys):
     """Each committed file matches the current map; a stale one is named."""
     for path, text in generated.files().items():
         assert path.read_text() == text, f"{path.name} is stale: run `make generate` and commit it"
-    for name in ("RDL", "MAP_PACKAGE", "REGISTER_FILE", "BOARD_FILE", "HIL_FILE", "C_HEADER", "NAMES"):
-        path = getattr(generated, name)
+    names = ("RDL", "MAP_PACKAGE", "REGISTER_FILE", "BOARD_FILE", "HIL_FILE", "C_HEADER", "NAMES")
+    paths = [getattr(generated, name) for name in names]
+    for name, path in zip(names, paths, strict=True):
         stale = tmp_path / path.name
         stale.write_text(path.read_text() + "\n")
-        with monkeypatch.context() as patch:
-            patch.setattr(generated, name, stale)
-            patch.setattr("sys.argv", ["generate", "--check"])
-            assert generate.main() == 1
-        assert f"{path.name} is stale" in capsys.readouterr().err
+        monkeypatch.setattr(generated, name, stale)
+    monkeypatch.setattr("sys.argv", ["generate", "--check"])
+    assert generate.main() == 1
+    told = capsys.readouterr().err
+    assert all(f"{path.name} is stale" in told for path in paths) and told.count("is stale") == len(paths), told
 
 
 def test_register_addresses_are_fixed(monkeypatch):

@@ -24,6 +24,7 @@ from cocotb_tests.support.board.run_cases import (
     status,
 )
 from cocotb_tests.support.needs import skip_without_ghdl5
+from cocotb_tests.support.slow import slowly
 from fluxproof.checkout import DRIVES, ROOT
 from fluxproof.command import main
 from fluxproof.cosim.board_clock import SEEN
@@ -76,7 +77,7 @@ def test_faults_of_the_board_in_ghdl(run, after, tmp_path):
     assert facts["clocks"] > 0 and (facts["board_first"] == 1 << NAMES.index("hall_code")) == stopped
 
 
-@pytest.mark.parametrize("run", ["faults, serial and modulators", "faults, edges"])
+@pytest.mark.parametrize("run", ["faults, serial and modulators", slowly("faults, edges")])
 def test_every_fault_of_the_board_through_the_pins(tmp_path, run):
     """Faults of the front ends, ignored and not, a host that is silent, the trip pin: gates and irq at every clock."""
     facts = in_ghdl(RUNS[run]().periods, run, tmp_path)

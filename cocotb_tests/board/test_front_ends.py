@@ -12,6 +12,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from cocotb_tests.support.board.fault_cases import MOVED, RATE
 from fluxproof.checkout import ROOT
 from fluxproof.cosim import board_clock, ghdl
@@ -60,6 +62,7 @@ def test_a_trip_beats_a_clear():
     assert facts["first_faults"] == [1 << TRIP] * 12 and facts["running_at_last"]
 
 
+@pytest.mark.slow
 def test_hall_codes_stop_the_drive_by_name():
     """Code 111 refuses the enable; a code that skips a sector, one line at 0 and 111 while it runs turn it off."""
     facts = run("hall_code")

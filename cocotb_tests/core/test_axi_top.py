@@ -9,6 +9,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 
 from cocotb_tests.support.drives import PAPER
 from fluxproof.checkout import ROOT
@@ -17,6 +18,7 @@ from fluxproof.cosim import ghdl
 CARRIER_HALF, CLOCK_HZ = 72, 1_440_000
 
 
+@pytest.mark.slow
 def test_motor_spins_over_the_registers():
     generics = {"CARRIER_HALF": CARRIER_HALF, "CLOCK_HZ": CLOCK_HZ}
     environment = {

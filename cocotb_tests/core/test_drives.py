@@ -3,16 +3,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from cocotb_tests.support.drives import PAPER, check_message
 from cocotb_tests.support.needs import skip_without_ghdl5
 from fluxproof.checkout import DRIVES
+from fluxproof.cosim.driven_plant import Scenario
+from fluxproof.cosim.golden_loop import simulate
 from fluxproof.cosim.runs import InVerilator, Named
 from fluxproof.plant import Sensors, position_code, sensor_params
-from golden_model.drive import load, with_carrier
+from golden_model.drive import DriveError, load, with_carrier
 from golden_model.registers import registers
+from golden_model.units import from_si
 
 NAMES = ("servo_24v", "hub_36v", "spindle_400v", "drone_24v")
 
@@ -94,6 +99,48 @@ def test_plant_reports_the_middle_of_a_count():
         assert abs((away + 0.5) % 1.0 - 0.5) <= 0.5 / 4000 + 0.5 / 65536 + 1e-12
     inside = {position_code(sensors, 2 * np.pi * (17 + part) / 4000, 0) for part in (0.01, 0.5, 0.99)}
     assert inside == {round(17.5 * 65536 / 4000)}
+
+
+def resolver(pairs: int):
+    """emrax228, a motor of ten pole pairs, with a resolver of so many."""
+    drive = load(DRIVES / "emrax228.toml")
+    return replace(drive, sensors=replace(drive.sensors, position_bits=16, position_pole_pairs=pairs))
+
+
+@pytest.mark.parametrize("pairs", [2, 5, 10])
+def test_a_resolver_with_several_pole_pairs_gives_the_same_drive(pairs):
+    """A start to 60 rpm against friction: angle, speed and current as with one pair, within codes."""
+    seen = [_started(resolver(n)) for n in (1, pairs)]
+    turned = [10 * np.cumsum(run.plant["omega_m"]) * resolver(1).sample_time_s for run in seen]  # electrical
+    assert turned[0][-1] > 1.0 and np.abs(turned[0] - turned[1]).max() < 0.02
+    for name, most in (("omega_me", 0.05), ("i_q", 0.05)):
+        of_both = [run.observed[name] for run in seen]
+        assert np.abs(of_both[0] - of_both[1]).max() < most * np.abs(of_both[0]).max(), name
+    drive = resolver(pairs)
+    jump = {row.name: row.represented for row in registers(drive).rows}["jump_max"]
+    assert jump == pytest.approx(4 / 65536 + pairs * 5e-4, abs=2**-13)
+
+
+def _started(drive):
+    n, nothing = 600, np.zeros(600, np.int64)
+    scenario = Scenario(
+        omega_ref=nothing + from_si("omega_ref", 60 * np.pi / 30 * 10, drive), load=np.zeros(n), brake=np.full(n, 2.0),
+        u_dc=np.full(n, drive.inverter.dc_bus_v), i_d_ref=nothing, i_q_ext=nothing, speed_mode=nothing + 1,
+        enable=nothing + 1, theta_m=2.0,
+    )  # fmt: skip
+    return simulate(drive, registers(drive), scenario)
+
+
+def test_a_resolver_that_does_not_tell_the_electrical_angle_is_refused():
+    """Its pole pairs divide the motor's; what counts turns of the shaft needs a code of one turn."""
+    for pairs in (3, 4, 20):
+        with pytest.raises(DriveError, match="position_pole_pairs = .* a divisor of .*, 1, 2, 5, 10: "):
+            resolver(pairs)
+    drive = resolver(5)
+    with pytest.raises(DriveError, match=r"1 with \[core\] position_loop"):
+        replace(drive, core=replace(drive.core, position_loop=True))
+    with pytest.raises(DriveError, match='kind = "abz", whose counts'):
+        replace(drive, encoder=replace(drive.encoder, kind="abz", counts=4000))
 
 
 def test_clock_accurate_simulations_drop_front_ends_with_clocks():

@@ -30,7 +30,7 @@ from golden_model.units import from_si, one_is, to_si
 
 
 @pytest.mark.parametrize("rpm, turned", [
-    (300.0, 1.1), (-300.0, 2.0), (300.0, 2.9), slowly(-300.0, 1.1), slowly(300.0, 2.0), slowly(-300.0, 2.9),
+    slowly(300.0, 1.1), (-300.0, 2.0), slowly(300.0, 2.9), slowly(-300.0, 1.1), slowly(300.0, 2.0), slowly(-300.0, 2.9),
 ])  # fmt: skip
 def test_wrong_angle_is_a_runaway(rpm, turned):
     """The rotor's angle 99, 180, 261 degrees off at 300 rpm: runaway is named below a third of the rated speed.
@@ -54,7 +54,7 @@ def test_right_angle_off_is_a_stall():
     assert first(device) == ["stall"] and np.abs(result.plant["omega_m"]).max() < 1.0
 
 
-@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("sign", [slowly(1), -1])
 def test_torque_mode_without_load_ends_in_overspeed(sign):
     device, result = play(2000, i_q=sign * 1.0, start_rpm=sign * 3500.0)
     assert first(device) == ["overspeed"] and not device.running[-1]
@@ -65,7 +65,7 @@ def test_torque_mode_without_load_ends_in_overspeed(sign):
     assert device.running[beyond] and not any(device.running[beyond + 3 :])
 
 
-@pytest.mark.parametrize("i_d", [12.0, -12.0])
+@pytest.mark.parametrize("i_d", [slowly(12.0), -12.0])
 @pytest.mark.parametrize("i_q", [None, 9.0])
 def test_current_stays_in_its_circle(i_d, i_q):
     """i_d_ref of 12 A with a limit of 7.1 A, alone and with i_q_ref beside it."""

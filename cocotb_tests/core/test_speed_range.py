@@ -160,6 +160,7 @@ def test_registers_command_writes_the_table(tmp_path):
     assert json.dumps(load_list(registers(plain)))
 
 
+@pytest.mark.slow
 def test_rtl_over_the_border():
     """The RTL in Verilator equals the golden core over base speed, bus sag and stop."""
     from fluxproof.cosim.runs import InVerilator, Named

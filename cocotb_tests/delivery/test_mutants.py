@@ -13,7 +13,7 @@ import pytest
 from cocotb_tests.support.needs import skip_without_ghdl5
 from fluxproof.checkout import RTL
 from scripts.mutate import __main__ as command
-from scripts.mutate import board, defects, table
+from scripts.mutate import board, defects, draw, table
 from scripts.mutate.equivalent import DIFFERENT, EQUIVALENT, UNKNOWN
 from scripts.mutate.judge import KILLED, WrongHarness, judge
 from scripts.mutate.subject import Subject
@@ -99,3 +99,18 @@ def test_text_of_a_planted_defect_occurs_once(defect):
 def test_every_reason_is_of_a_block_that_is_mutated():
     names = {subject.of for subject in command.subjects()} | {command.Core().of, command.Board(0).of}
     assert {block for block, _, _ in table.REASONS} <= names
+
+
+def test_a_bit_inverted_where_words_differ_anyway_is_not_drawn():
+    """n = 6: bit 0 inverted where bit 3, which 6 has not, is 1, or where bit 1 is 0; the other way round it matters."""
+    word = {"A": [2, 3, 4, 5], "B": ["0", "1", "1"], "Y": [6]}
+    directions = {"A": "input", "B": "input", "Y": "output"}
+    cell = {"type": "$eq", "connections": word, "port_directions": directions, "parameters": {"A_SIGNED": "0"}}
+    module = {"cells": {"$eq$1": cell}, "read": {6}, "inside": {}}
+
+    def without_effect(mode: str, control: int) -> bool:
+        place = f"mutate -mode {mode} -module m -cell $eq$1 -port A -portbit 0 -ctrlbit {control}"
+        return draw.without_effect(module, place)
+
+    assert without_effect("cnot1", 3) and without_effect("cnot0", 1)
+    assert not without_effect("cnot0", 3) and not without_effect("cnot1", 1)

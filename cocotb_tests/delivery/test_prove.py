@@ -14,7 +14,7 @@ from scripts.prove import abc_engine
 from scripts.prove.catalogue import catalogue
 from scripts.prove.judge import judge
 from scripts.prove.proof import Fault
-from scripts.prove.solve import BrokenProof, plant
+from scripts.prove.solve import BrokenProof, faulty, plant
 
 LIMIT = 120
 PROOFS = {proof.name: proof for proof in catalogue()}
@@ -64,7 +64,7 @@ def test_every_block_and_fault_exists(tmp_path):
     for proof in PROOFS.values():
         assert proof.faults, f"{proof.name} has no planted fault"
         for fault in proof.faults:
-            plant(fault, tmp_path / "rtl")
+            faulty(fault)
     with pytest.raises(BrokenProof, match="occurs 0 times"):
         plant(Fault("nothing", "fluxproof.vhd", "no such text", ""), tmp_path / "rtl")
 

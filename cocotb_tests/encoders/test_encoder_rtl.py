@@ -20,6 +20,7 @@ CLOCKS = 250_000
 EDGES = 1_000_000
 
 
+@pytest.mark.slow
 def test_edges_in_verilator():
     assert compare(EDGES // 20) >= EDGES // 20
 

@@ -215,6 +215,7 @@ def item_of(entry) -> Item:
     return Item(entry.path, entry.drive, "key")
 
 
+@pytest.mark.slow
 def test_recordings_of_an_object_store(fleet, tmp_path):
     """An archive stands for an object store: both are read through fsspec."""
     archive = tmp_path / "store.zip"
@@ -316,6 +317,7 @@ def test_no_scheduler_is_one_line(fleet, tmp_path, monkeypatch, capsys):
     assert said.count("\n") == 0 and "tcp://127.0.0.1:9: no connection" in said
 
 
+@pytest.mark.slow
 def test_a_report_is_made_when_asked_for(fleet, tmp_path):
     some = listed(fleet[0])
     key = next(r["key"] for r in pq.read_table(fleet[1] / "fleet.parquet").to_pylist() if r["serial"] == "S03")

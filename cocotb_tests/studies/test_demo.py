@@ -227,6 +227,7 @@ def needs_conversion() -> None:
         pytest.skip(str(reason))
 
 
+@pytest.mark.slow
 def test_the_telemetry_of_the_rtl_is_that_of_the_golden_model(tmp_path, monkeypatch):
     """What the core was given on the motor that differs, replayed, gives what the RTL put out."""
     needs_conversion()
@@ -245,7 +246,7 @@ def test_the_telemetry_of_the_rtl_is_that_of_the_golden_model(tmp_path, monkeypa
         assert np.array_equal(observed[:, k], arrays[f"observed_{name}"]), name
 
 
-@pytest.mark.parametrize("engine", [slowly(runs.InVerilator), runs.InGhdl])
+@pytest.mark.parametrize("engine", [slowly(runs.InVerilator), slowly(runs.InGhdl)])
 def test_replay(log, engine, tmp_path, monkeypatch):
     """A recording in both engines, equal in every bit of every sample, the demo's way."""
     if engine is runs.InVerilator:

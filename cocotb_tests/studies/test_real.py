@@ -39,6 +39,7 @@ def laas_entry(tmp_path_factory):
     return run(laas, tmp_path_factory.mktemp("laas"))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("split", ("operating_points", "operating_points_loaded", "later_time", "later_time_loaded"))
 def test_emrax_improves_on_both_axes(emrax_entry, split):
     for axis in "dq":
@@ -46,6 +47,7 @@ def test_emrax_improves_on_both_axes(emrax_entry, split):
         assert both["after"] < 0.4 * both["before"]
 
 
+@pytest.mark.study
 def test_emrax_names_what_its_log_can_show(emrax_entry):
     told = set(emrax_entry["effects"]).union(*emrax_entry["ambiguity"])
     assert {"dead_time", "encoder_offset", "cross_saturation"} <= set(emrax_entry["effects"])
@@ -59,6 +61,7 @@ def test_emrax_names_what_its_log_can_show(emrax_entry):
     assert len(emrax_entry["cannot_tell"]) > 4
 
 
+@pytest.mark.study
 def test_emrax_improved_drive_in_closed_loop(emrax_entry):
     before, after = (emrax_entry["closed_loop_rms"][f"rms_{k}"] for k in ("before", "after"))
     assert all(after[u] < 0.4 * before[u] for u in ("u_d_ref", "u_q_ref"))

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cocotb_tests.support.slow import halved
 from fluxproof.checkout import ROOT
 from studies.blind import __main__ as blind
 from studies.blind import reliability
@@ -45,7 +46,7 @@ def test_every_fault_and_unknown_is_drawn(generator):
     assert kinds == set(UNKNOWN) - unknown
 
 
-@pytest.mark.parametrize("generator", GENERATORS)
+@pytest.mark.parametrize("generator", halved(GENERATORS))
 def test_a_seed_gives_the_same_recording_and_another_seed_does_not(generator):
     def columns(seed):
         return cases.columns_of(_short(cases.make(generator, seed, 4, "healthy", 0)), seed, 4)

@@ -227,7 +227,7 @@ static void enable_gates(void)
 /* Mechanical speed in rpm from and to the core's per unit of electrical speed. */
 static double rpm_per_unit(void)
 {
-    return FLUXPROOF_BASE_OMEGA_ME_RAD_S / get(AT(pole_pairs)) * 30.0 / PI / 65536.0;
+    return FLUXPROOF_BASE_OMEGA_ME_RAD_S / FLUXPROOF_POLE_PAIRS * 30.0 / PI / 65536.0;
 }
 
 static double speed_rpm(void)

@@ -149,7 +149,8 @@ def judge(s: Session, ways: list[Seen], reverse_given: bool | None) -> Step:
     if abs(abs(ratio) - 1.0) > SLOPE or slopes[0] * slopes[1] < 0.0 or abs(slopes[0] - slopes[1]) > 2.0 * SLOPE:
         raise Refusal(
             f"the encoder moved {slopes[0]:.3f} and {slopes[1]:.3f} turns a turn of the field, expected 1 or -1; check "
-            "[machine] pole_pairs, [encoder] counts, and whether the load lets the shaft turn freely"
+            "[machine] pole_pairs, [encoder] counts, [sensors] position_pole_pairs, and whether the load lets the "
+            "shaft turn freely"
         )
     reverse = ratio < 0.0
     if reverse_given is not None and reverse_given != reverse:

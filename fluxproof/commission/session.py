@@ -113,7 +113,7 @@ class Session:
     @property
     def code_pairs(self) -> int:
         """Electrical turns in a turn of the code: Hall sensors alone give an electrical code."""
-        return 1 if self.coarse else self.drive.machine.pole_pairs
+        return 1 if self.coarse else self.drive.code_pairs
 
     @property
     def coarse(self) -> bool:

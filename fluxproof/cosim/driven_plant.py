@@ -94,6 +94,7 @@ def described_sensors(drive) -> Sensors:
         u_dc_bits=s.adc_bits,
         u_dc_full_scale_v=s.u_dc_range_v,
         position_bits=s.position_bits,
+        position_pole_pairs=s.position_pole_pairs,
         position_counts=drive.encoder.counts or 0,
     )
 

@@ -331,6 +331,7 @@ def edges_run() -> FaultRun:
         10: {"clear_encoder": 1},
         **cleared(11),
         14: {"board_ignore": INDEX},
+        **cleared(15),  # the first clear found the index unknown: the gates run again before the host is silent
         **host_and_pin(20),
     }
 

@@ -103,11 +103,11 @@ def current_bound(recording: Recording, drive: Drive) -> np.ndarray:
 
     Half a code of each converter and of the resolver, then the roundings on the way to i_d and i_q.
     """
-    base, machine, s = drive.bases.current_a, drive.machine, drive.sensors
+    base, s = drive.bases.current_a, drive.sensors
     phase = s.current_range_a / 2.0**s.adc_bits + base * PU.lsb / 2.0
     vector = 4.0 / 3.0 * phase  # three phase errors of one size: (2/3) * |1 - a - a**2| = 4/3
     length = np.hypot(recording.i_d, recording.i_q) + vector
-    angle = np.pi * machine.pole_pairs / 2.0**s.position_bits
+    angle = np.pi * drive.code_pairs / 2.0**s.position_bits
     # Along alpha three times, along beta sqrt(3) times the vector meets its coefficient's rounding.
     coefficients = np.hypot(3.0 * clarke.THIRD.fmt.lsb / 2.0, np.sqrt(12.0) * clarke.INV_SQRT12.fmt.lsb / 2.0)
     trig = np.sqrt(2.0) * sincos.bound(None, None)["cos_theta"]

@@ -39,7 +39,7 @@ class Length:
     patient: bool  # whether the cases come too that take long, such as a wide counter at its end
 
 
-SHORT = Length(500, 200, 1000, 300, 0, 0, 1000, False)  # GHDL, some ten thousand clocks a second
+SHORT = Length(300, 100, 500, 150, 0, 0, 500, False)  # GHDL, some ten thousand clocks a second
 MEDIUM = Length(1500, 400, 2000, 1200, 0, 0, 0, False)  # the model against floating point, both in Python
 LONG = Length(1500, 500, 30000, 1500, 2000, 1000, 10000, True)  # Verilator
 

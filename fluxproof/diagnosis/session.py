@@ -30,7 +30,6 @@ from fluxproof.diagnosis.conventions.apply import read_drive, read_recording
 from fluxproof.diagnosis.decide.decision import Decision
 from fluxproof.diagnosis.decide.rules import not_compared
 from fluxproof.diagnosis.effects import MeasurementError
-from fluxproof.diagnosis.fleet.prior import among, load_prior
 from fluxproof.diagnosis.ground.nominal import Nominal, load_nominal
 from fluxproof.diagnosis.ground.recording import Problem, Recording, RecordingError
 from fluxproof.diagnosis.ground.result import FILES, Diagnosis, Digital
@@ -170,16 +169,19 @@ def _checked(recording: Recording, nominal: Nominal) -> Recording:
 
 def _worked(loaded, nominal, progress, fleet=None) -> Worked:
     """The digital part, then the physics if the controller's outputs equal those of its golden model."""
-    prior = load_prior(fleet, nominal.path) if fleet is not None else None
+    prior = placed = None
+    if fleet is not None:  # imported here, as the statistics of a population take a tenth of a diagnosis to load
+        from fluxproof.diagnosis.fleet import prior as population
+
+        prior = population.load_prior(fleet, nominal.path)
     digital, notes = _digital(loaded, progress)
     nominal, differ = as_ran(nominal, loaded)
     if digital.first_difference is not None:
         found = outcome(not_compared("digital_mismatch"), loaded)
     else:
         found = _physics(loaded, nominal, progress, prior.shifts() if prior else None)
-    placed = None
     if prior is not None:
-        placed = among(prior, found.decision.posterior)
+        placed = population.among(prior, found.decision.posterior)
         notes.append(prior_note(placed, found.decision))
     if any("registers" in recording.meta for recording in loaded):
         said = [ran_with(differ)] if differ else []

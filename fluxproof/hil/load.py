@@ -55,6 +55,7 @@ def refuse(drive: Drive, machine: Machine, sensors: Sensors) -> None:
         "[plant.sensors] eccentricity_once_rad": sensors.eccentricity_once_rad,
         "[plant.sensors] eccentricity_twice_rad": sensors.eccentricity_twice_rad,
         "[plant.sensors] position_noise_rad": sensors.position_noise_rad,
+        "[sensors] position_pole_pairs beyond one": sensors.position_pole_pairs - 1,
         "[plant.machine] iron_conductance_s": machine.iron_conductance_s,
         "[plant.machine] shorted_share": machine.shorted_share,
     }

@@ -23,7 +23,8 @@ class Sensors:
     Bus voltage: code = round((u (1 + gain_error) + offset + noise) / lsb), unsigned.
     Position: the sensed mechanical angle is direction theta_m + offset
     + a1 sin(theta_m + p1) + a2 sin(2 theta_m + p2) + noise, rounded, modulo a turn; with
-    position_counts the code is that of the middle of the count the shaft is in.
+    position_counts the code is that of the middle of the count the shaft is in.  The code of a resolver with several
+    pole pairs runs through its range position_pole_pairs times a turn.
     """
 
     current_bits: int = 12
@@ -46,6 +47,7 @@ class Sensors:
     position_noise_rad: float = 0.0
     seed: int = 0
     position_counts: int = 0  # of an incremental encoder a turn; 0: the code alone quantises
+    position_pole_pairs: int = 1
 
 
 class SensorParams(NamedTuple):
@@ -71,6 +73,7 @@ class SensorParams(NamedTuple):
     position_noise: float
     seed: int
     position_counts: int
+    position_pole_pairs: int
 
 
 def sensor_params(sensors):
@@ -101,6 +104,7 @@ def sensor_params(sensors):
         float(s.position_noise_rad),
         int(s.seed),
         int(s.position_counts),
+        int(s.position_pole_pairs),
     )
 
 
@@ -163,9 +167,9 @@ def sensed_angle(sensors, theta_m):
 
 @njit
 def position_code(sensors, theta_m, sample):
-    """Code 0..2^bits - 1 of the mechanical angle [rad] at a sample number."""
+    """Code 0..2^bits - 1 of the mechanical angle [rad] at a sample number, or of the resolver's own turn."""
     seen = sensed_angle(sensors, theta_m) + _noise(sensors.position_noise, sensors.seed, 4, sample)
-    turns = seen / (2.0 * math.pi)
+    turns = seen * sensors.position_pole_pairs / (2.0 * math.pi)
     codes = 1 << sensors.position_bits
     part = turns - math.floor(turns)
     if sensors.position_counts > 0:

@@ -115,7 +115,9 @@ def modelled(drive: Drive, runs: list[Run]) -> list[str]:
     if drive.encoder.counts:
         lines.append(f"position in counts: {drive.encoder.counts} a turn, from the start referenced")
     else:
-        lines.append(f"position in codes of {drive.sensors.position_bits} bits")
+        pairs = drive.sensors.position_pole_pairs
+        of = "" if pairs == 1 else f", of a resolver with {pairs} pole pairs"
+        lines.append(f"position in codes of {drive.sensors.position_bits} bits{of}")
     lines.append(_bus(drive))
     saturates = any((m.saturation_d_per_a2, m.saturation_q_per_a2, m.cross_saturation_wb_per_a2))
     lines.append("saturation as given" if saturates else "constant inductances: [machine] gives no saturation")

@@ -25,7 +25,8 @@ certain what a leg loses, or a leg near its zero crossing is the mean: the means
 
 Formats: fluxes S(1,30), rotated ones saturated; carried S(2,30); e S(-3,20), an eighth of the flux base in a sample,
 saturated; power U(-4,36), cut; the mean of the sum U(1,20).  Multiples of theta are saturated at 2, which no sine
-reaches.  Products are rounded half up, those of the limits cut; means are cut from seven bits below.
+reaches; the cosines of 2 and 3 theta do not come there for any two numbers up to 1.  Products are rounded half up,
+those of the limits cut; means are cut from seven bits below.
 """
 
 from collections import namedtuple
@@ -51,6 +52,7 @@ SAMPLES = Format(0, 12, 0)
 SAMPLES_HI, PU_HI = SAMPLES.hi, PU.hi
 MEAN = 7  # 2**MEAN samples
 RESIDUAL_W, SUM_W = RESIDUAL.width, SUM.width
+FOLLOWED = 250  # samples of the stimuli
 DROP_TRIG = TRIG.frac_bits
 DROP_TWICE = TRIG.frac_bits - 1
 DROP_LAMBDA = FLUX.frac_bits + TRIG.frac_bits - FLUX_STATE.frac_bits
@@ -91,9 +93,9 @@ def balance(carried, lambda_, i, u, rho, t_s):
 @kernel
 def sixth_turn(cos, sin):
     """Cosine and sine of six times the angle, by its double and its triple."""
-    cos_2 = saturate(round_half_up(cos * cos, DROP_TWICE) - TRIG_ONE, PU_W)
+    cos_2 = round_half_up(cos * cos, DROP_TWICE) - TRIG_ONE
     sin_2 = round_sat(sin * cos, DROP_TWICE, PU_W)
-    cos_3 = round_sat(cos * cos_2 - sin * sin_2, DROP_TRIG, PU_W)
+    cos_3 = round_half_up(cos * cos_2 - sin * sin_2, DROP_TRIG)
     sin_3 = round_sat(sin * cos_2 + cos * sin_2, DROP_TRIG, PU_W)
     cos_6 = saturate(round_half_up(cos_3 * cos_3, DROP_TWICE) - TRIG_ONE, PU_W)
     return cos_6, round_sat(sin_3 * cos_3, DROP_TWICE, PU_W)
@@ -322,7 +324,42 @@ def stimuli(rng, _config):
             rows += [push | {"residual_sum_max": min(least, SUM_LEAST.hi)}] * 8
             rows += [push | {"i_q": 4096, "residual_sum_i": min(least << 12, SUM_OF_I.hi)}] * 8
         rows += [push | {"i_b": PU.hi, "i_c": PU.hi}, push | {"i_b": PU.lo, "i_c": PU.lo}, rest | {"run": 0}, rest]
-    return rows
+    return rows + _followed(rng, rest)
+
+
+def _followed(rng, rest):
+    """Limits of flux, voltage and multiples of the angle, each followed by a flux that leaves a residual within range.
+
+    A residual at its own limit hides what went before it.  Cosine and sine need not be those of an angle.
+    """
+    rows, state = [], State()
+    ends = {p.name: p.high for p in INPUTS if p.name in ("u_applied_alpha", "u_applied_beta", "s_alpha", "s_beta")}
+    for k in range(FOLLOWED):
+        shift, beyond = int(rng.integers(20)), (state.carried_alpha >> 30, state.carried_beta >> 30)
+        signs = [int(rng.choice((-1, 1))) if -2 <= b <= 1 else -1 if b > 0 else 1 for b in (*beyond, *beyond)]
+        row = rest | {n: int(rng.integers(-TRIG_ONE, TRIG_ONE + 1)) for n in ("cos_theta", "sin_theta")}
+        if k % 3 == 0:  # where the sines of 2, 3 and 6 theta are largest; where its cosine is
+            row |= {n: int(rng.choice((-TRIG_ONE, TRIG_ONE))) for n in ("cos_theta", "sin_theta")}
+            row["cos_theta"] = row["cos_theta"] * (100 if k % 4 == 3 else int(rng.integers(60, 101))) // 100
+        for (name, most), sign in zip(ends.items(), signs, strict=True):  # near its end, or of any size
+            size = most - (most >> shift + 1) if k % 4 < 2 else int(rng.integers(most + 1)) >> shift
+            row[name] = sign * size if name[0] == "u" else -sign * size
+        row |= {"t_s": int(rng.integers(1, T_S.high)) >> shift // 5, "residual_samples": 3}
+        row |= {"residual_leg": int(rng.integers(V_LEVEL.hi + 1)) >> shift // 2, "rho": int(rng.integers(1 << 16))}
+        row |= {f"i_{x}": int(rng.integers(PU.lo, PU.hi + 1)) >> shift for x in ("alpha", "beta")}
+        left = [int(rng.integers(-1, 2)) << int(rng.integers(DROP_E + RESIDUAL_W - 2)) for _ in beyond]
+        drops = [(row["rho"] * row[f"i_{x}"]) >> DROP_RHO for x in ("alpha", "beta")]
+        turn = complex(row["cos_theta"], row["sin_theta"]) or 1.0
+        wanted = complex(state.carried_alpha - drops[0] + left[0], state.carried_beta - drops[1] + left[1])
+        if k % 12 == 3:  # beside the limit of a flux, or beyond it
+            near = int(rng.choice((-1, 1))) * (FLUX_STATE.hi - 4 * left[0])
+            wanted = complex(near, left[1]) if k % 24 == 3 else complex(left[1], near)
+        flux = wanted / turn * (1 << DROP_LAMBDA)
+        for x, part in (("d", flux.real), ("q", flux.imag)):
+            row[f"model_{x}"] = min(max(round(part), FLUX.lo), FLUX.hi) << DROP_MODEL
+        state, _ = step(state, Inputs(*(row[p.name] for p in INPUTS)), Registers(*(row[p.name] for p in REGISTERS)))
+        rows.append(row)
+    return [rest | {"run": 0}, *rows]
 
 
 BLOCK = Block(

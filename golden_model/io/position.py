@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Resolver or encoder code to electrical angle: theta_me = pole_pairs * code + theta_offset, modulo one turn.
 
+``pole_pairs`` are electrical turns in a turn of the code: the motor's pole pairs over those of a resolver.
+
 Formats: a code of 8 to 18 bits is left-aligned in 18 bits.  Nothing is rounded; every operation is
 modulo one turn, because angles wrap.  ``reverse`` = 1 inverts the sense of rotation (code -> -code).
 """
@@ -54,7 +56,7 @@ BLOCK = Block(
     inputs=(Port("code_theta", Format(0, 0, 16), doc="position code, one mechanical turn"),),
     registers=(
         Port("reverse", BIT, doc="1: code counts opposite to the phase order"),
-        Port("pole_pairs", POLE_PAIRS, lo=1, doc="pole pairs"),
+        Port("pole_pairs", POLE_PAIRS, lo=1, doc="electrical turns in a turn of the code"),
         Port("theta_offset", TURN, doc="electrical angle at code zero"),
     ),
     outputs=(Port("theta_me", TURN, doc="electrical angle"),),

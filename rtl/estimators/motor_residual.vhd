@@ -15,6 +15,7 @@
 -- Formats: fluxes S(1,30), rotated ones saturated; carried S(2,30); e S(-3,20) saturated; power U(-4,36), cut.
 -- Latency: 38.  Interval: 38.
 -- Rounding: products half up, those of the limits cut; means are cut from seven bits below; the counter saturates.
+-- Multiples of theta saturate at 2, which the cosines of 2 and 3 theta do not reach for any two numbers up to 1.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -212,11 +213,11 @@ begin
 
       -- The products, two clocks later
       case n is
-        when 2 => cos_2 <= saturate(twice(prod) - ONE, PU_W);
+        when 2 => cos_2 <= resize(twice(prod) - ONE, PU_W);
         when 3 => sin_2 <= saturate(twice(prod), PU_W);
         when 5 => lambda_alpha <= round_sat(diff_2, MOTOR_RESIDUAL_DROP_LAMBDA, FLUX_STATE_W);
         when 7 => lambda_beta <= round_sat(sum_2, MOTOR_RESIDUAL_DROP_LAMBDA, FLUX_STATE_W);
-        when 9 => cos_3 <= round_sat(diff_2, MOTOR_RESIDUAL_DROP_TRIG, PU_W);
+        when 9 => cos_3 <= resize(round_half_up(diff_2, MOTOR_RESIDUAL_DROP_TRIG), PU_W);
         when 11 => sin_3 <= round_sat(sum_2, MOTOR_RESIDUAL_DROP_TRIG, PU_W);
         when 12 =>
           u_alpha        <= saturate(u_applied_alpha - round_half_up(prod, MOTOR_RESIDUAL_DROP_LEG), FLUX_W);

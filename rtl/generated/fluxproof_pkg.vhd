@@ -77,7 +77,7 @@ package fluxproof_pkg is
     gain_c           : signed(PU_W - 1 downto 0);  -- current per code, phase c
     two_sensors      : std_logic;  -- 1: phase a has no sensor, its current is minus the sum of the others
     reverse          : std_logic;  -- 1: code counts opposite to the phase order
-    pole_pairs       : unsigned(5 downto 0);  -- pole pairs
+    pole_pairs       : unsigned(5 downto 0);  -- electrical turns in a turn of the code
     theta_offset     : unsigned(TURN_W - 1 downto 0);  -- electrical angle at code zero
     k_speed          : unsigned(23 downto 0);  -- speed per turn and sample
     k_filter         : unsigned(DUTY_W - 1 downto 0);  -- filter weight of the new sample, 1 = no filter

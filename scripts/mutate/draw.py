@@ -25,7 +25,7 @@ PREPARE = "proc; memory_collect; opt_expr -mux_undef -fine; wreduce; opt_expr -f
 PREPARE += "; splitnets -driver; splitcells; opt_dff -nodffe -nosdff"
 _DETAIL = re.compile(r" -(?:wire|wirebit|src) \S+")
 # What a cell does not calculate with: a mutated clock is no fault of the logic.
-_PLACE = re.compile(r"mutate -mode (\w+) -module \S+ -cell (\S+) -port \\?(\S+) -portbit (\d+)")
+_PLACE = re.compile(r"mutate -mode (\w+) -module \S+ -cell (\S+) -port \\?(\S+) -portbit (\d+)(?: -ctrlbit (\d+))?")
 _WRAPPED = re.compile(r"^\s*(\w+) inside \(", re.MULTILINE)  # fluxproof/cosim/flat.py
 _CLOCKS = re.compile(r" -port (?:CLK|RD_CLK|WR_CLK|clk) ")
 
@@ -75,9 +75,10 @@ def netlist(folder: Path, top: str) -> dict:
 def without_effect(module: dict, mutation: str) -> bool:
     """Whether the mutation changes nothing that is read: a bit without a reader, a constant made the same constant.
 
-    An instance may have a record as a port of which it needs a part.
+    An instance may have a record as a port of which it needs a part.  Of a word that is compared with a constant, a bit
+    inverted where another one is not the constant's leaves the two different.
     """
-    mode, name, port, bit = _PLACE.match(mutation).groups()
+    mode, name, port, bit, control = _PLACE.match(mutation).groups()
     cell = module["cells"][name.removeprefix("\\")]
     value = cell["connections"][port][int(bit)]
     if cell["port_directions"][port] == "output":
@@ -85,6 +86,10 @@ def without_effect(module: dict, mutation: str) -> bool:
     ports, read = module["inside"].get(cell["type"], ({}, set()))
     if port in ports and ports[port]["bits"][int(bit)] not in read:
         return True
+    if cell["type"] == "$eq" and mode in ("cnot0", "cnot1"):
+        other, signed = cell["connections"]["AB".replace(port, "")], int(cell["parameters"]["A_SIGNED"], 2)
+        beyond = "x" if signed else "0"
+        return [*other, *[beyond] * 64][int(control)] == str(1 - int(mode[-1]))
     return value == "x" or f"const{value}" == mode
 
 

@@ -49,17 +49,23 @@ class Answer:
     seconds: float
 
 
-def plant(fault: Fault, tree: Path) -> Path:
-    """A copy of the RTL with the fault in it; BrokenProof unless its text occurs exactly once."""
-    shutil.rmtree(tree, ignore_errors=True)
-    shutil.copytree(ROOT / "rtl", tree)
-    text = (tree / fault.file).read_text()
+def faulty(fault: Fault) -> str:
+    """The fault's file with the fault in it; BrokenProof unless its text occurs exactly once."""
+    text = (ROOT / "rtl" / fault.file).read_text()
     if text.count(fault.old) != 1:
         raise BrokenProof(
             f"fault '{fault.says}': its text occurs {text.count(fault.old)} times in rtl/{fault.file}, expected once: "
             f"{fault.old.strip()!r}"
         )
-    (tree / fault.file).write_text(text.replace(fault.old, fault.new))
+    return text.replace(fault.old, fault.new)
+
+
+def plant(fault: Fault, tree: Path) -> Path:
+    """A copy of the RTL with the fault in it; BrokenProof unless its text occurs exactly once."""
+    text = faulty(fault)
+    shutil.rmtree(tree, ignore_errors=True)
+    shutil.copytree(ROOT / "rtl", tree)
+    (tree / fault.file).write_text(text)
     return tree
 
 

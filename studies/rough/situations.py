@@ -287,11 +287,11 @@ TABLE = (
         scripted(serial_run, frozenset(("position_lost", "converter_over", "host_lost", "trip"))),
     ),
     Situation(
-        "a script: index lost and wrong, host, trip",
+        "a script: index wrong and lost, host, trip",
         "each named",
         ("servo_24v",),
         (0.0,),
-        scripted(edges_run, frozenset(("no_index", "index_wrong", "host_lost", "trip"))),
+        scripted(edges_run, frozenset(("index_wrong", "host_lost", "trip"))),
     ),
     Situation("the host is silent", "host_lost in the heartbeat's time", ALL, (0.3,), silent_host),
 )

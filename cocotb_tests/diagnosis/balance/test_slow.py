@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.recordings.slow_logs import LEVELS, NOMINAL, Truth, log
+from cocotb_tests.support.slow import slowly
 from fluxproof.diagnosis.balance.messages import message_period
 from fluxproof.diagnosis.balance.misfit import misfit
 from fluxproof.diagnosis.balance.slow_stretches import Stretches, stretches, stretches_in_motion
@@ -163,8 +164,8 @@ def test_held_messages_are_not_balanced_in_motion():
     "kind, name, key",
     [
         ("filter", "delay", "delay_s"),
-        ("angle", "delay", "angle_late_s"),
-        ("iron", "iron_loss", "iron_resistance_ohm"),
+        slowly("angle", "delay", "angle_late_s"),
+        slowly("iron", "iron_loss", "iron_resistance_ohm"),
     ],
 )
 def test_operating_points_show_what_is_late(kind, name, key, tmp_path):

@@ -108,6 +108,14 @@ def test_an_eccentric_encoder_is_left_to_the_catalogue(nominal):
     assert found == []
 
 
+@pytest.mark.parametrize("rising", [0.5, 0.8])
+def test_an_eccentric_encoder_that_leans_loses_no_counts(nominal, rising):
+    """A wave that rises slowly and falls fast: the median row of a turn loses 2 degrees, the whole turn nothing."""
+    wave = lambda angle: np.interp(np.mod(angle / (2 * np.pi * PAIRS), 1.0), [0.0, rising, 1.0], [-1.0, 1.0, -1.0])  # noqa: E731
+    found, _, _ = checked(nominal, lambda angle: 1.0 * DEGREE * wave(angle))
+    assert found == []
+
+
 def test_a_course_between_bins_is_that_of_their_means():
     """Means over a bin weaken an order, as a line between them does: a fifth of the fifth order would stay."""
     bins, fine = angle_course.BINS, 40

@@ -32,6 +32,7 @@ SPECIAL = {
     "sensors.position_direction": -1,
     "sensors.seed": 3,
     "sensors.position_counts": 4096,
+    "sensors.position_pole_pairs": 2,
 }
 THREE = ("phase_resistance_asymmetry", "current_gain_error", "current_offset_a")
 

@@ -80,6 +80,7 @@ def test_the_improved_drive_holds_the_unit_that_the_numbers_gave_away(tmp_path):
 @pytest.mark.parametrize(
     "name", halved(["currents in rms", "R and L line to line", "bus at half", "angle 90 degrees behind"], every=4)
 )
+@pytest.mark.slow
 def test_an_effect_behind_a_mistake_is_named_with_its_size(name, tmp_path):
     """The magnets are 5 % weaker; under the right reading that is found too."""
     deviations = {"machine": (("magnet_flux_wb", 0.15675),)}

@@ -7,6 +7,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.signal import savgol_filter
 
 from cocotb_tests.support.drives import PAPER
 from fluxproof.cosim.driven_plant import described_sensors
@@ -16,7 +17,7 @@ from fluxproof.diagnosis.ground.recording import RecordingError, from_columns
 from fluxproof.diagnosis.ground.result import Fit, NamedEffect
 from fluxproof.diagnosis.improve.improve import plant_of, write_improved
 from fluxproof.diagnosis.overlay.compare import closed_loop, is_worse
-from fluxproof.diagnosis.overlay.inputs import dq_currents
+from fluxproof.diagnosis.overlay.inputs import SMOOTH_ROWS, dq_currents, smooth
 from fluxproof.diagnosis.replay.capture import capture
 from fluxproof.diagnosis.replay.telemetry import read_dump, write_dump
 from fluxproof.plant import (
@@ -158,3 +159,10 @@ def test_a_worse_drive_is_not_advised(after, worse):
     fit = Fit(noise_floor=0.1)
     assert is_worse({"rms_before": rms(2.0), "rms_after": rms(after)}, fit) is worse
     assert not is_worse({"rms_before": rms(2.0)}, fit) and not is_worse(None, fit)
+
+
+def test_references_are_smoothed_by_local_parabolas():
+    """As by the filter of Savitzky and Golay, at the ends too."""
+    values = np.cumsum(np.random.default_rng(1).standard_normal(300))
+    np.testing.assert_allclose(smooth(values), savgol_filter(values, SMOOTH_ROWS, 2), atol=1e-9)
+    np.testing.assert_array_equal(smooth(values[: SMOOTH_ROWS - 1]), values[: SMOOTH_ROWS - 1])

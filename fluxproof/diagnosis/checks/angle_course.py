@@ -23,6 +23,7 @@ SHARP = 0.3  # of a step: most change within one side
 MOST_STEPS = 4
 DRIFT, MOST_DRIFT = 2.0, 30.0  # degrees electrical in the whole recording; in a turn: more is another number of poles
 PARTS, ALIKE = 4, 0.35  # of the recording, whose drifts differ by at most this share
+TWELFTHS = 12  # of a turn of the shaft
 BINS, LIKE = 24, 0.9  # of an electrical turn; correlation of its course in the parts
 UNEVEN = 1.0  # degrees electrical, rms, of orders that only sectors have
 SECTORS, OF_EMF = (3, 4, 5), (0, 6, 12)  # orders 1 and 2 have other causes too, and 6 is that of the EMF
@@ -49,16 +50,21 @@ def _drift(recording, nominal, change, turns) -> None:
     known = np.flatnonzero(np.isfinite(change))
     if len(known) < LEAST_ROWS:
         return
-    rates = [float(np.median(change[part] / turns[part])) for part in np.array_split(known, PARTS)]
-    rate = float(np.median(change[known] / turns[known]))
     shaft = np.append(0.0, np.cumsum(recording["omega_e"][:-1] * np.diff(recording["t"])))
     shaft = shaft / (2 * np.pi * nominal.machine.pole_pairs)
+    each, part = change[known] / turns[known], np.floor(np.mod(shaft[known], 1.0) * TWELFTHS).astype(int) % TWELFTHS
+    if (np.bincount(part, minlength=TWELFTHS) == 0).any():
+        return
+    # All parts of a turn count alike: an eccentric encoder that rises slowly and falls fast is falling in few rows.
+    rate = float(np.mean([np.median(each[part == n]) for n in range(TWELFTHS)]))
+    rates = [float(np.median(piece)) for piece in np.array_split(each, PARTS)]
     total = abs(rate) * np.abs(np.diff(shaft)).sum()
     if total < DRIFT * DEGREE or abs(rate) > MOST_DRIFT * DEGREE or max(abs(r / rate - 1.0) for r in rates) > ALIKE:
         return
     turn(recording, -rate * shaft)
     per_turn, bits = rate / DEGREE, nominal.sensors.position_bits
-    counts = abs(per_turn) / (360.0 * nominal.machine.pole_pairs) * (2**bits if bits else 1.0)
+    turns = abs(per_turn) / (360.0 * nominal.machine.pole_pairs) * nominal.sensors.position_pole_pairs
+    counts = turns * (2**bits if bits else 1.0)
     size = f"{counts:.2g} counts of {2**bits}" if bits else f"{1e6 * counts:.0f} ppm of the counts"
     message = (
         f"the angle {'gains' if rate > 0 else 'loses'} {abs(per_turn):.3g} degrees electrical with every turn of the "

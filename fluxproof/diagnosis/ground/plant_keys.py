@@ -53,6 +53,7 @@ OWN = {  # ranges that are neither the core's nor those of a unit
     "sensors.position_noise_rad": Key("float", "rad", 0.0, RANGES["rad"][1]),
     "sensors.position_direction": Key("int", lo=-1, hi=1, least=1.0),
     "sensors.position_counts": Key("int", lo=0, hi=1 << 24),
+    "sensors.position_pole_pairs": Key("int", lo=1, hi=63),
     "sensors.seed": Key("int", lo=0, hi=(1 << 63) - 1),
     "machine.cogging_order": Key("int", lo=0, hi=100_000),
     "machine.shorted_share": Key("float", "1", 0.0, 0.9),

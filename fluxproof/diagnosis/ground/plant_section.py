@@ -126,6 +126,7 @@ def described_sensors(nominal: Nominal) -> dict:
         "u_dc_gain_error": 1.0 / s.u_dc_gain - 1.0,
         "u_dc_offset_v": s.u_dc_offset_code * volts / 2**bits,
         "position_bits": s.position_bits or FINE_BITS,
+        "position_pole_pairs": s.position_pole_pairs,
         "position_offset_rad": -turning * s.theta_offset_rad / nominal.machine.pole_pairs,
         "position_direction": turning,
     }

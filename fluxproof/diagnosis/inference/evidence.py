@@ -116,9 +116,10 @@ def _coefficients(rows, columns, weighted, state):
             m[p, q] = precision[p, q] * deviation[p] * deviation[q]
         m[p, p] += 1.0
     inverse = np.linalg.inv(m)
-    state.z[:] = inverse @ (right * deviation)
+    solved = np.dot(inverse, right * deviation)
     for p in range(k):
-        state.c[p] = state.z[p] * deviation[p]
+        state.z[p] = solved[p]
+        state.c[p] = solved[p] * deviation[p]
         for q in range(k):
             state.cov[p, q] = inverse[p, q] * deviation[p] * deviation[q]
 
@@ -177,7 +178,7 @@ def _residual(rows, columns, state):
     k, n = columns.x.shape
     left = rows.y - np.dot(state.c, columns.x)
     spread = np.dot(state.cov, columns.x)
-    squares, own = state.squares, state.own
+    squares, own, mine = state.squares, state.own, np.zeros(k)
     for i in range(n):
         squares[i] = left[i] * left[i]
         own[i] = 0.0
@@ -186,7 +187,8 @@ def _residual(rows, columns, state):
             squares[i] += spread[p, i] * columns.x[p, i]
     for e in range(len(columns.most)):
         if columns.formula[e] > 0.0:
-            mine = np.where(columns.owner == e, state.c, 0.0)
+            for p in range(k):
+                mine[p] = state.c[p] if columns.owner[p] == e else 0.0
             part = np.dot(mine, columns.x)
             for i in range(n):
                 own[i] += (columns.formula[e] * part[i]) ** 2

@@ -6,7 +6,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from fluxproof.diagnosis.ground.nominal import Nominal
 from fluxproof.diagnosis.ground.recording import Recording, RecordingError
@@ -107,8 +106,14 @@ def filled(values: np.ndarray) -> np.ndarray:
 
 
 def smooth(values: np.ndarray) -> np.ndarray:
-    """Local parabola over SMOOTH_ROWS rows around each row; shorter columns are unchanged."""
-    return np.asarray(savgol_filter(values, SMOOTH_ROWS, 2)) if len(values) >= SMOOTH_ROWS else values
+    """Local parabola over SMOOTH_ROWS rows around each row, or at that end; shorter columns are unchanged."""
+    if len(values) < SMOOTH_ROWS:
+        return values
+    half = SMOOTH_ROWS // 2
+    basis, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, SMOOTH_ROWS), 3))
+    local = basis @ basis.T  # the values of a parabola at all rows of a window
+    first, last = local @ values[:SMOOTH_ROWS], local @ values[-SMOOTH_ROWS:]
+    return np.concatenate([first[:half], np.correlate(values, local[half], "valid"), last[half + 1 :]])
 
 
 def _slow(recording, nominal, rows):

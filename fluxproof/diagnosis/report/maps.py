@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.colors import Normalize
-from scipy.stats import binned_statistic_2d
 
 from fluxproof.diagnosis.report import theme
 
@@ -95,8 +94,9 @@ def _count(x, y, spans) -> int:
 
 def _cells(x, y, values, spans, count: int):
     """rms per cell, (count, count), NaN in empty cells; and the cell edges."""
-    mean, edges_x, edges_y, _ = binned_statistic_2d(x, y, values**2, "mean", bins=count, range=spans)
-    return np.sqrt(mean), edges_x, edges_y
+    total, edges_x, edges_y = np.histogram2d(x, y, count, spans, weights=values**2)
+    filled = np.histogram2d(x, y, count, spans)[0]
+    return np.sqrt(np.divide(total, filled, out=np.full_like(total, np.nan), where=filled > 0.0)), edges_x, edges_y
 
 
 def _wider(span, share=0.04):
