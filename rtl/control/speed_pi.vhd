@@ -5,7 +5,7 @@
 --   integral += speed_ki*err unless u is beyond the limit and err pushes further, or the bus voltage limited the braking
 --   current of the last sample (regen_limited) and err brakes
 -- Torque mode (speed_mode = 0): i_q_ref is i_q_ext, limited, and the integral follows it.
--- take_over = 1, the first sample of speed or position control: i_q_ref is i_q_ext once more, and the integral is what
+-- take_over = 1, the first sample of speed control or the first two of position control: i_q_ref is i_q_ext once more, and the integral is what
 -- makes it so beside the proportional part, within +-i_q_max.
 -- run = 0: output and integral are zero.  torque_ff, of a trajectory, acts in speed mode; zero without one.
 -- Formats: err PU, proportional part with torque_ff 28 fraction bits, integral S(1,28), output PU.

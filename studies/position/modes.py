@@ -27,7 +27,7 @@ MODES = ("torque", "voltage", "speed", "position")
 FIRST_S, CHANGE_S, END_S = 0.2, 0.25, 0.3
 LOAD = 0.5  # of the rated torque
 TARGET = 0.02  # of the circle
-STEP_SAMPLES = 3  # from the change on: what later samples do is a regulator's answer
+STEP_SAMPLES = 5  # from the change on, two more than position mode takes over in: later ones are a regulator's answer
 
 
 def with_modes(drive, built: bool = True):
