@@ -8,8 +8,9 @@
 
 The limit i_q_max is what current_limit leaves beside i_d, in both modes.
 Torque mode (``speed_mode`` = 0): i_q_ref is ``i_q_ext``, limited, and the integral follows it, so that
-a change to speed mode with no speed error is bumpless.  ``take_over``, the first sample of speed control or the
-first two of position control: the output is i_q_ext once more, and the integral is what makes it so beside the proportional part, within its limit.
+a change to speed mode with no speed error is bumpless.
+``take_over``, the first sample of speed control or the first two of position control: the output is i_q_ext once
+more, and the integral is what makes it so beside the proportional part, within its limit.
 ``regen_limited``: in the last sample the bus voltage limited the braking
 current, see regeneration_limit.  ``run`` = 0: output and integral are zero.  torque_ff, of a trajectory, acts in
 speed mode within the same limit; it is zero without one.
