@@ -14,9 +14,8 @@ from pathlib import Path
 
 from fluxproof.commission.bus import BusError, UioBus
 from fluxproof.commission.ring import read_ring
-from fluxproof.diagnosis.whole_drive import load_drive
+from fluxproof.diagnosis.whole_drive import flux_of, load_drive
 from fluxproof.files import refuse_overwriting
-from fluxproof.print_registers import flux_of
 from fluxproof.quote import put, say
 from fluxproof.stage import alone
 from golden_model import fluxproof

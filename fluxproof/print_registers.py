@@ -10,8 +10,7 @@ import argparse
 import json
 from pathlib import Path
 
-from fluxproof.diagnosis.ground.plant_keys import read_flux_map
-from fluxproof.diagnosis.whole_drive import load_drive
+from fluxproof.diagnosis.whole_drive import flux_of, load_drive
 from fluxproof.files import refuse_overwriting, write_json
 from fluxproof.quote import c_comment, put
 from fluxproof.stage import alone
@@ -62,24 +61,6 @@ def run(args: argparse.Namespace) -> int:
     else:
         put("\n".join(bases_lines(drive, result) + [""] + table(result.rows)))
     return 0
-
-
-def flux_of(path: str | None, drive: Drive) -> torque_table.Flux | None:
-    """The flux linkage of a map's file; DriveError where the drive has no torque table or the map ends too early."""
-    if path is None:
-        return None
-    if not drive.core.references:
-        raise DriveError(
-            "--flux-map makes a torque table, which the drive file does not ask for: [core] references = true"
-        )
-    chart = read_flux_map(Path(path))
-    reach = min(-chart.i_d_a[0], chart.i_q_a[-1])
-    if reach < drive.current_limit_a * (1.0 - 1e-6):
-        raise DriveError(
-            f"{path}: the map ends at i_d = {chart.i_d_a[0]:g} A, i_q = {chart.i_q_a[-1]:g} A: expected is a map up to "
-            f"the current limit, {drive.current_limit_a:g} A"
-        )
-    return torque_table.measured(chart.i_d_a, chart.i_q_a, chart.psi_d_wb, chart.psi_q_wb)
 
 
 def load_list(result: RegisterSet) -> list[dict]:

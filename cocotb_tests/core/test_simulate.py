@@ -125,7 +125,7 @@ def test_drives_work(tmp_path, capsys, name):
     html = (tmp_path / "out" / "report.html").read_text()
     for key in ("machine.cogging_order", "machine.cogging_amplitude_nm", "timing.delay_s"):
         assert key in text and key in html
-    assert html.count("<svg") == 6 and "http-equiv" in html and "What is not modelled" in html
+    assert html.count("<svg") == 8 and "http-equiv" in html and "What is not modelled" in html
     assert not re.search(r"<script|(?:src|href)=\"http", html)
 
 

@@ -110,6 +110,8 @@ def _number(value: float) -> float:
 
 
 def _plain(note):
+    if isinstance(note, dict):
+        return {key: _plain(part) for key, part in note.items()}
     if isinstance(note, (list, tuple)):
         return [_plain(part) for part in note]
     return note if isinstance(note, (bool, str)) else _number(note)
