@@ -33,6 +33,16 @@ def test_a_change_makes_no_step_of_the_voltage(pair):
     assert step_of(DRIVE, *pair) < modes.TARGET
 
 
+def test_a_current_beyond_its_limit_does_not_spoil_the_flux():
+    """A host that leaves the rotational voltage out drives i_d over the limit; torque mode brings it back."""
+    scenario, values, at = modes.change(DRIVE, "voltage", "torque", rotates=False)
+    observed = figures.play(DRIVE, scenario, **values).observed
+    size = np.hypot(*(to_si(f"i_{x}", np.asarray(observed[f"i_{x}"]), DRIVE) for x in "dq"))
+    wrong = np.hypot(*(to_si(f"delta_lambda_{x}", np.asarray(observed[f"delta_lambda_{x}"]), DRIVE) for x in "dq"))
+    assert size[at] > DRIVE.current_limit_a > size[at + 60]
+    assert wrong[at : at + 20].max() < 0.05 * DRIVE.machine.magnet_flux_wb
+
+
 def test_without_the_block_a_change_makes_a_step():
     """The scene would show it: torque to speed mode with a speed error of a tenth."""
     assert step_of(modes.with_modes(DRIVE, False), "torque", "speed") > 0.1

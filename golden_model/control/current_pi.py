@@ -9,12 +9,13 @@
 This delay of one sample keeps the block independent of the limiter; the integral winds up for at most
 that sample.  ``run`` = 0: outputs and integrals are zero.
 
-``follows``: int = u_rest - kp*err, saturated, so u_pi = u_rest, what the voltage of the last sample leaves beside
-decoupling and compensation.  With ``by_voltage``, the host's voltage, the proportional part is zero: int = u_rest.
+``follows``: int = u_rest, what the voltage of the last sample leaves beside decoupling and compensation, which is R*i as
+delta_lambda needs it; an error answers with its proportional part, as after a step of the reference.  With
+``by_voltage``, the host's voltage, the proportional part is zero.
 
 Formats: err saturated to PU; proportional part rounded half up to S(9,28), which holds every product; increment
 rounded half up to S(1,28), where 2**-16 * ki still counts; integral saturated to S(1,28), twice the largest voltage
-the limiter grants; sum exact, rounded half up to PU and saturated, again twice the limiter's.
+the limiter grants, which holds every u_rest; sum exact, rounded half up to PU and saturated, again twice the limiter's.
 """
 
 from collections import namedtuple
@@ -50,7 +51,7 @@ def axis(integral, i, i_ref, sat, u_rest, inputs, kp, ki):
     if inputs.by_voltage:
         proportional = 0
     if inputs.follows:
-        integral = saturate((u_rest << PU_TO_INTEGRAL) - proportional, INTEGRAL_W)
+        integral = u_rest << PU_TO_INTEGRAL
     if not inputs.run:
         integral, proportional = 0, 0
     return integral, round_sat(proportional + integral, PU_TO_INTEGRAL, PU_W)
@@ -73,7 +74,7 @@ def reference(v, state):
         integral = INTEGRAL.limit(integral)
         proportional = 0.0 if v["by_voltage"] else v[f"kp_{x}"] * err
         if v["follows"]:
-            integral = INTEGRAL.limit(v[f"u_rest_{x}"] - proportional)
+            integral = v[f"u_rest_{x}"]
         total = proportional + integral
         out[f"u_int_{x}"] = integral if v["run"] else 0.0
         out[f"u_pi_{x}"] = PU.limit(total) if v["run"] else 0.0
@@ -81,7 +82,7 @@ def reference(v, state):
 
 
 def bound(v, _state):
-    inner = max(INTEGRAL.lsb / 2, v["follows"] * PROPORTIONAL.lsb / 2)
+    inner = INTEGRAL.lsb / 2
     total = PROPORTIONAL.lsb / 2 + inner + PU.lsb / 2
     return {"u_pi_d": total, "u_pi_q": total, "u_int_d": inner, "u_int_q": inner}
 

@@ -3,8 +3,8 @@
 --   err = i_ref - i;  u_pi = kp*err + int
 --   int += ki*err unless the voltage was at its limit and err pushes further
 -- sat_d, sat_q (-1, 0, +1): the limits that were active in the previous sample.  run = 0: all zero.
--- follows = 1: int = u_rest - kp*err, so u_pi = u_rest, what the voltage of the last sample leaves;  by_voltage = 1: the
--- voltage is the host's, no proportional part.
+-- follows = 1: int = u_rest, what the voltage of the last sample leaves;  by_voltage = 1: the voltage is the host's, no
+-- proportional part.
 -- One pipeline for both axes: d, then q a clock later.
 -- Formats: err PU, proportional part 28 fraction bits, integral S(1,28), output PU.
 -- Latency: 6 (d, then q: i_q and i_q_ref are needed a clock after i_d, u_pi_d is valid with out_soon).
@@ -99,8 +99,7 @@ begin
     port map (clk => clk, a => ki_0, b => err_0, c => integral_0, y => moved_3, limited => open);
 
   process (clk)
-    variable u_pi         : signed(PU_W - 1 downto 0);
-    variable proportional : signed(PROP_W - 1 downto 0);
+    variable u_pi : signed(PU_W - 1 downto 0);
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
@@ -110,15 +109,14 @@ begin
       held_2 <= held_1;
       held_3 <= held_2;
 
-      -- Stage 4: integral = moved unless held, or u_rest - proportional;  all zero while not running
-      proportional := proportional_3 and not by_voltage;
-      proportional_4 <= proportional;
+      -- Stage 4: integral = moved unless held, or u_rest;  all zero while not running
+      proportional_4 <= proportional_3 and not by_voltage;
       integral_4     <= moved_3;
       if held_3 = '1' then
         integral_4 <= state.integral_q when valid(4) = '1' else state.integral_d;
       end if;
       if follows = '1' then
-        integral_4 <= saturate(shift_left(resize(u_rest_3, PROP_W + 1), PU_TO_INTEGRAL) - proportional, INTEGRAL_W);
+        integral_4 <= shift_left(resize(u_rest_3, INTEGRAL_W), PU_TO_INTEGRAL);
       end if;
       if run = '0' then
         proportional_4 <= (others => '0');

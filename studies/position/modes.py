@@ -40,8 +40,11 @@ def registers_of(mode: str) -> Mapping[str, int]:
     return {"position_mode": int(mode == "position"), "voltage_mode": int(mode == "voltage")}
 
 
-def change(drive, before: str, after: str):
-    """(scenario, registers in place of the drive's, sample of the change)."""
+def change(drive, before: str, after: str, rotates: bool = True):
+    """(scenario, registers in place of the drive's, sample of the change).
+
+    Without ``rotates`` the host leaves the rotational voltage of the d axis out, and the current grows beyond its limit.
+    """
     m, t_s = drive.machine, drive.sample_time_s
     speed = 0.5 * limits(drive)[0]
     first, at, n = (round(t / t_s) for t in (FIRST_S, CHANGE_S, END_S))
@@ -60,15 +63,21 @@ def change(drive, before: str, after: str):
     chosen = {0: registers_of("speed"), first: registers_of(before), at: registers_of(after)}
     target = {"position_target": POSITION.hi}
     scenario = dataclasses.replace(scenario, changes={k: {**v, **target} for k, v in chosen.items()})
+    u_d = -speed * m.pole_pairs * m.inductance_q_h * current if rotates else 0.0
     values = {
-        "u_q_ext": from_si("u_q", 0.9 * emf, drive), "move_speed": round(speed * t_s / TURN_RAD * 2.0**34)
+        "u_d_ext": from_si("u_d", 0.9 * u_d, drive), "u_q_ext": from_si("u_q", 0.9 * emf, drive),
+        "move_speed": round(speed * t_s / TURN_RAD * 2.0**34),
     }  # fmt: skip
     return scenario, values, at
 
 
 def step_of(drive, observed: Mapping[str, np.ndarray], at: int) -> float:
-    """Largest step of u_dq in the samples of a change, of the voltage circle."""
-    u = np.hypot(*(np.diff(to_si(f"u_{x}", np.asarray(observed[f"u_{x}"]), drive)) for x in "dq"))
+    """Largest step of u_dq in the samples of a change, of the voltage circle.
+
+    Without the compensation of the dead time, which steps six times a turn in every mode.
+    """
+    motor = {x: np.asarray(observed[f"u_{x}"]) - np.asarray(observed[f"u_comp_{x}"]) for x in "dq"}
+    u = np.hypot(*(np.diff(to_si(f"u_{x}", of, drive)) for x, of in motor.items()))
     return float(u[at - 1 : at - 1 + STEP_SAMPLES].max()) * math.sqrt(3.0) / drive.inverter.dc_bus_v
 
 
