@@ -9,8 +9,8 @@
 This delay of one sample keeps the block independent of the limiter; the integral winds up for at most
 that sample.  ``run`` = 0: outputs and integrals are zero.
 
-``follows``: int = u_rest, what the voltage of the last sample leaves beside decoupling and compensation, which is R*i as
-delta_lambda needs it; an error answers with its proportional part, as after a step of the reference.  With
+``follows``: int = u_rest, what the voltage of the last sample leaves beside decoupling and compensation, which is R*i
+as delta_lambda needs it; an error answers with its proportional part, as after a step of the reference.  With
 ``by_voltage``, the host's voltage, the proportional part is zero.
 
 Formats: err saturated to PU; proportional part rounded half up to S(9,28), which holds every product; increment

@@ -43,7 +43,7 @@ def registers_of(mode: str) -> Mapping[str, int]:
 def change(drive, before: str, after: str, rotates: bool = True):
     """(scenario, registers in place of the drive's, sample of the change).
 
-    Without ``rotates`` the host leaves the rotational voltage of the d axis out, and the current grows beyond its limit.
+    Without ``rotates`` the host leaves the rotational voltage of the d axis out: the current grows beyond its limit.
     """
     m, t_s = drive.machine, drive.sample_time_s
     speed = 0.5 * limits(drive)[0]
