@@ -39,6 +39,7 @@ def test_full_ratio():
     assert result.plant["omega_m"][-1] * 30 / np.pi > 25
 
 
+@pytest.mark.slow
 def test_long_at_the_voltage_limit():
     """4,000 periods towards the rated speed, and back through zero, on a bus of 300 V."""
     skip_without_ghdl5()

@@ -330,7 +330,8 @@ def test_failing_overlay_adds_only_a_note(dump, tmp_path, monkeypatch):
     answer(tmp_path / "out")
 
 
-@pytest.mark.parametrize("digit", ["0", slowly("5")])
+@pytest.mark.slow
+@pytest.mark.parametrize("digit", ["0", "5"])
 def test_files_with_flipped_bits_end_without_traceback_and_without_a_name(digit, tmp_path):
     """Bits flipped in files of every format: they may be rejected, but no name comes without a finding."""
     nominal = nominal_of(tmp_path)

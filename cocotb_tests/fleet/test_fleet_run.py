@@ -242,6 +242,7 @@ def test_workers_that_are_killed_lose_and_double_nothing(monkeypatch):
     assert sorted(found) == [(n, n * n) for n in range(12)]
 
 
+@pytest.mark.slow
 def test_a_recording_that_takes_its_workers_with_it_is_given_up(monkeypatch):
     monkeypatch.setitem(engines.SETTINGS, "distributed.scheduler.allowed-failures", 1)
     with Engine(2) as engine:

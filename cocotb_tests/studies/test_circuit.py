@@ -58,6 +58,7 @@ def test_it_shares_no_code_with_tool_plant_or_other_generators():
     assert own == {"fluxproof.files"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["servo", "traction"])
 def test_a_linear_machine_obeys_the_stator_equation_in_its_recording(kind):
     """The recorded columns alone, by the documented convention: u = R i + j omega psi within 1.5 thousandths."""

@@ -73,6 +73,7 @@ def test_it_shares_no_code_with_tool_plant_or_other_generators():
     assert own == {"fluxproof.files"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind, faults", [("surface", ()), ("interior", IRON), ("reluctance", ("resistance",))])
 def test_mean_voltages_obey_the_stator_equation(kind, faults):
     """u = R i + j omega psi over whole turns, within a thousandth; without saturation psi is the linear one."""

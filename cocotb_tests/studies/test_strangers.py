@@ -56,6 +56,7 @@ def test_a_seed_gives_the_same_recording_and_another_seed_does_not(generator):
     assert len(one["t"]) != len(other["t"]) or not np.array_equal(one["i_a"], other["i_a"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("generator", GENERATORS)
 def test_the_true_resistance_closes_the_voltage_balance(generator):
     """At rest the d voltage over the d current is the real resistance, not the one of the drive file."""

@@ -47,6 +47,7 @@ def test_the_lost_flux_and_its_instant_are_named(halves, recording):
     assert any("loss occurred just before" in note for note in answer.notes)
 
 
+@pytest.mark.slow
 def test_without_these_effects_no_constant_one_takes_their_place(recording, monkeypatch):
     """The mean of both halves looks like a wrong magnet flux, or like a bus gain: neither is there."""
     for name in ("demagnetisation", "magnet_temperature"):

@@ -65,6 +65,7 @@ def test_table_and_writes_are_replayed(run, tmp_path):
     assert not got.checked and "does not hold the targets" in notes[0]
 
 
+@pytest.mark.slow
 def test_a_write_that_is_not_told_is_a_difference(run, tmp_path):
     got, _ = replayed(tmp_path / "a.dump", run, changes={k: v for k, v in WRITES.items() if k != 500})
     assert (got.first_difference or {})["sample"] == 500

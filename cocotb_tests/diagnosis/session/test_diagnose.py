@@ -65,7 +65,7 @@ def test_a_healthy_drive_has_no_mismatch():
     assert answer.rows == len(GRID) * 800 and answer.problems == ()
 
 
-@pytest.mark.parametrize("name", [slowly(n) if n in ("resistance", "magnet_flux", "saturation") else n for n in CASES])
+@pytest.mark.parametrize("name", [n if n in ("dead_time", "encoder_offset") else slowly(n) for n in CASES])
 def test_an_effect_is_named_with_its_size(name):
     deviation, parameter, value, bound = CASES[name]
     answer = diagnose(recorded(**deviation), NOMINAL)

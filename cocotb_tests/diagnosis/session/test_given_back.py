@@ -8,7 +8,6 @@ import pytest
 
 from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.recordings.with_effect import NOMINAL, T, healthy, usual, with_effect
-from cocotb_tests.support.slow import halved
 from fluxproof.diagnosis import diagnose
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.balance.cells import cells_of
@@ -36,7 +35,8 @@ def sizes(worked):
     return Sizes(setup, setup.cells.y, setup.cells.y, np.ones(len(setup.view), bool), True)
 
 
-@pytest.mark.parametrize("name", halved(CATALOGUE, every=24))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", list(CATALOGUE))
 def test_the_improved_drive_leaves_no_misfit(name, tmp_path):
     effect = CATALOGUE[name]
     if isinstance(effect, MeasurementError) or name in STAYS:

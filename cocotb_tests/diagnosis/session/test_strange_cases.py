@@ -54,7 +54,7 @@ def test_the_noise_is_at_most_that_of_the_misfit(tmp_path):
 @pytest.mark.parametrize(
     ("seed", "count", "number", "names"),
     [
-        (24112026, 100, 24, {"magnet_temperature", "resistance_temperature"}),  # the sensor lags: no wrong resistance
+        slowly(24112026, 100, 24, {"magnet_temperature", "resistance_temperature"}),  # the sensor lags
         slowly(LATER, 80, 1, {"current_offset", "sampling_skew"}),  # noise at full speed was cut as if it were outliers
         slowly(LATER, 80, 15, {"inductance_q", "saturation"}),  # the saturation's curve took the inductance
         slowly(LAST, 100, 17, {"cross_saturation", "saturation"}),  # its curve took an inductance to help
