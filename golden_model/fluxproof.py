@@ -477,6 +477,7 @@ def step_table(state, sample, regs, config, of_speed, table):
     i_d_asked = state.i_d_table if by_table else x.i_d_ref
     modes_state, (by_voltage, take_over, follows) = state.of_mode_change, (0, 0, 0)
     i_d_source, i_q_used, torque_ff_used = i_d_asked, x.i_q_ext, state.torque_ff
+    omega_source, by_speed = x.omega_ref, x.speed_mode
     begun = state.of_mode_references
     if c.modes:
         position_acts = 1 if c.position_loop and r.position_mode else 0
@@ -486,17 +487,19 @@ def step_table(state, sample, regs, config, of_speed, table):
         torque_ff_used = state.torque_ff if position_acts else 0
         i_d_asked = begun.i_d_now if begun.hold_d else i_d_source
         i_q_used = begun.i_q_now if begun.hold_q or take_over else x.i_q_ext
+        by_speed = 1 if x.speed_mode and not position_acts else 0
+        omega_source = begun.omega_now if by_speed and begun.hold_omega else x.omega_ref
     current_limit_state, (i_d_limited, i_q_max) = current_limit.step(state.of_current_limit, i_d_asked, r.i_max)
     most = state.torque_max if by_table else i_q_max
     position_state, (shaft_position, position_error, omega_asked, regulates) = (
-        state.of_position_control, (0, 0, x.omega_ref, x.speed_mode),
+        state.of_position_control, (0, 0, omega_source, x.speed_mode),
     )  # fmt: skip
     if c.position_loop:
         position_state, (shaft_position, position_error, omega_asked, regulates) = position_control.step(
             state.of_position_control,
             position_control.Inputs(
                 code_theta=x.position_code, position_ref=state.position_ref, omega_ff=state.omega_ff,
-                at_rest=state.at_rest, omega_ref=x.omega_ref, speed_mode=x.speed_mode,
+                at_rest=state.at_rest, omega_ref=omega_source, speed_mode=x.speed_mode,
             ),
             position_control.Registers(
                 reverse=r.reverse, position_restart=of_speed.position_restart, position_mode=r.position_mode,
@@ -587,12 +590,13 @@ def step_table(state, sample, regs, config, of_speed, table):
     references_state, u_rest_d, u_rest_q = state.of_mode_references, 0, 0
     if c.modes:
         made = e.torque if by_table else i_q
-        references_state, (_, _, _, _, _, _, u_rest_d, u_rest_q) = mode_references.step(
+        references_state, (_, _, _, _, _, _, _, _, u_rest_d, u_rest_q) = mode_references.step(
             state.of_mode_references,
             mode_references.Inputs(
                 u_d=u_d, u_q=u_q, u_dec_d=u_dec_d, u_dec_q=u_dec_q, u_comp_d=given.u_comp_d, u_comp_q=given.u_comp_q,
                 i_d=i_d, i_q_made=made, i_d_source=i_d_source, i_q_ext=x.i_q_ext, torque_ref=torque_ref,
-                by_voltage=by_voltage, regulates=regulates, run=x.run,
+                omega_me=omega_me, omega_ref=x.omega_ref, by_voltage=by_voltage, by_speed=by_speed, regulates=regulates,
+                run=x.run,
             ),
             r,
         )  # fmt: skip

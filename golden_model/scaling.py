@@ -25,6 +25,7 @@ docs/board.md.
 
 import math
 
+from golden_model.formats import PU
 from golden_model.mode_scaling import modes
 from golden_model.motion import position_loop
 from golden_model.protection_limits import protection
@@ -89,6 +90,11 @@ def speed_loop(drive):
         kp, ki, per_speed, what = kp * per_ampere, ki * per_ampere, drive.torque_base_nm / b.omega_me_rad_s, "Nm"
     yield Entry("speed_kp", kp, f"{what} s/rad", per_speed, f"{kp_keys}; {base}")
     yield Entry("speed_ki", ki, f"{what}/rad", per_speed / t_s, f"{ki_keys}; {base}")
+    # After a change of modes the proportional part moves as i_step; a step below one LSB would never end.
+    ampere = speed_gains(drive)[0] * b.omega_me_rad_s  # at a speed error of one per unit
+    change = max(min(drive.current_limit_a * t_s / (c.mode_change_s * ampere), 1.0) if ampere else 1.0, PU.lsb)
+    keys = f"[control] mode_change_s, current_limit_a, speed_bandwidth_hz; {base_keys(drive, 'omega_me_rad_s')}"
+    yield Entry("omega_step", change * b.omega_me_rad_s, "rad/s", b.omega_me_rad_s, keys)
     limit = "[machine] rated_current_a" if c.current_limit_a is None else "[control] current_limit_a"
     yield Entry("i_max", drive.current_limit_a, "A", b.current_a, f"{limit}; {base_keys(drive, 'current_a')}")
 

@@ -104,6 +104,7 @@ architecture rtl of fluxproof is
   signal i_d_asked, torque_limit, torque_ref : signed(PU_W - 1 downto 0);
 
   -- From the position loop to the speed regulator
+  signal omega_source             : signed(PU_W - 1 downto 0);
   signal omega_asked, torque_ff   : signed(PU_W - 1 downto 0);
   signal regulates, position_acts : std_logic;
   signal torque_ff_used           : signed(PU_W - 1 downto 0);
@@ -228,7 +229,7 @@ begin
       generic map (POSITION_BITS => POSITION_BITS)
       port map (clk => clk, rst => rst, in_valid => latch_valid,
                 code_theta => code_theta, position_ref => position_ref, omega_ff => omega_ff, at_rest => at_rest,
-                omega_ref => omega_ref, speed_mode => speed_mode,
+                omega_ref => omega_source, speed_mode => speed_mode,
                 reverse => settings.reverse, position_restart => settings.position_restart,
                 position_mode => settings.position_mode, position_kp => settings.position_kp,
                 position_band => settings.position_band, omega_most => settings.omega_most,
@@ -247,7 +248,7 @@ begin
                 at_rest => at_rest);
   else generate
     position_acts    <= '0';
-    omega_asked      <= omega_ref;
+    omega_asked      <= omega_source;
     regulates        <= speed_mode;
     torque_ff        <= (others => '0');
     o.shaft_position <= (others => '0');
@@ -255,8 +256,8 @@ begin
   end generate by_position;
 
   by_mode : if MODES = 1 generate
-    signal u_d_now, u_q_now, i_d_now, i_q_now : signed(PU_W - 1 downto 0);
-    signal hold_d, hold_q                     : std_logic;
+    signal u_d_now, u_q_now, i_d_now, i_q_now, omega_now : signed(PU_W - 1 downto 0);
+    signal hold_d, hold_q, hold_omega, by_speed          : std_logic;
   begin
     modes : entity work.mode_change
       port map (clk => clk, rst => rst, in_valid => latch_valid,
@@ -268,13 +269,17 @@ begin
       port map (clk => clk, rst => rst, in_valid => dq_voltage_valid,
                 u_d => o.u_d, u_q => o.u_q, u_dec_d => o.u_dec_d, u_dec_q => o.u_dec_q, u_comp_d => e.u_comp_d,
                 u_comp_q => e.u_comp_q, i_d => o.i_d, i_q_made => i_q_made, i_d_source => i_d_source,
-                i_q_ext => i_q_ext, torque_ref => torque_ref, by_voltage => by_voltage, regulates => regulates, run => run,
+                i_q_ext => i_q_ext, torque_ref => torque_ref, omega_me => o.omega_me, omega_ref => omega_ref,
+                by_voltage => by_voltage, by_speed => by_speed, regulates => regulates, run => run,
                 u_d_ext => settings.u_d_ext, u_q_ext => settings.u_q_ext, u_step => settings.u_step,
-                i_step => settings.i_step,
+                i_step => settings.i_step, omega_step => settings.omega_step,
                 out_valid => open, u_d_now => u_d_now, u_q_now => u_q_now, i_d_now => i_d_now, i_q_now => i_q_now,
-                hold_d => hold_d, hold_q => hold_q, u_rest_d => u_rest_d, u_rest_q => u_rest_q);
+                hold_d => hold_d, hold_q => hold_q, omega_now => omega_now, hold_omega => hold_omega,
+                u_rest_d => u_rest_d, u_rest_q => u_rest_q);
 
     i_d_asked <= i_d_now when hold_d = '1' else i_d_source;
+    by_speed  <= speed_mode and not position_acts;
+    omega_source <= omega_now when by_speed = '1' and hold_omega = '1' else omega_ref;
     i_q_used  <= i_q_now when hold_q = '1' or take_over = '1' else i_q_ext;
     -- The trajectory's torque of the sample before ends with position mode, not a sample after it
     torque_ff_used <= torque_ff and position_acts;
@@ -289,6 +294,7 @@ begin
     follows    <= '0';
     i_d_asked  <= i_d_source;
     i_q_used   <= i_q_ext;
+    omega_source <= omega_ref;
     torque_ff_used <= torque_ff;
     u_rest_d   <= (others => '0');
     u_rest_q   <= (others => '0');

@@ -1010,6 +1010,12 @@ extern "C" {
 #define FLUXPROOF__I_STEP__VALUE_bw 32
 #define FLUXPROOF__I_STEP__VALUE_reset 0x0
 
+// reg - fluxproof::omega_step
+#define FLUXPROOF__OMEGA_STEP__VALUE_bm 0xffffffff
+#define FLUXPROOF__OMEGA_STEP__VALUE_bp 0
+#define FLUXPROOF__OMEGA_STEP__VALUE_bw 32
+#define FLUXPROOF__OMEGA_STEP__VALUE_reset 0x1
+
 // reg - fluxproof::shaft_position
 #define FLUXPROOF__SHAFT_POSITION__VALUE_bm 0xffffffff
 #define FLUXPROOF__SHAFT_POSITION__VALUE_bp 0
@@ -2148,7 +2154,8 @@ typedef struct {
     uint32_t u_q_ext;
     uint32_t u_step;
     uint32_t i_step;
-    uint8_t RESERVED_2d0_2df[0x10];
+    uint32_t omega_step;
+    uint8_t RESERVED_2d4_2df[0xc];
     uint32_t shaft_position;
     uint32_t position_error;
     uint8_t RESERVED_2e8_33f[0x58];

@@ -170,6 +170,7 @@ ADDRESSES = {
     "u_q_ext": 0x2C4,
     "u_step": 0x2C8,
     "i_step": 0x2CC,
+    "omega_step": 0x2D0,
     "shaft_position": 0x2E0,
     "position_error": 0x2E4,
     "residual_min": 0x340,

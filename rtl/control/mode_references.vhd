@@ -1,13 +1,15 @@
 -- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: the references of a mode that begins: where the mode before ended, from there by limited steps to what is asked
--- for.  One pipeline moves u_d_now, u_q_now, i_d_now and i_q_now one after another.
+-- for.  One pipeline moves u_d_now, u_q_now, i_d_now, i_q_now and omega_now one after another.
 --   u_x_now  = to u_x_ext by u_step at most in voltage mode, else u_x - u_comp_x, the voltage that the motor has got
 --   i_d_now  = i_d in voltage mode, else to i_d_source by i_step at most
 --   i_q_now  = i_q_made in voltage mode, to i_q_ext by i_step at most in torque mode while it holds, else torque_ref
---   hold_d, hold_q: 1 in voltage mode (hold_q: outside of torque mode) and after it until the target is within i_step
+--   omega_now = to omega_ref by omega_step at most in speed mode while it holds, else omega_me
+--   hold_d, hold_q, hold_omega: 1 in voltage mode (hold_q: outside of torque mode, hold_omega: of speed mode) and after it
+--              until the target is within a step
 --   u_rest_x = u_x - u_dec_x - u_comp_x, what is left to a current regulator at this voltage
 -- All act on the next sample.  run = 0: all references are zero and nothing holds.
--- Formats: PU, sums exact.  Latency: 6.  Interval: 6.
+-- Formats: PU, sums exact.  Latency: 7.  Interval: 7.
 -- Rounding: none; sums saturate to PU.
 
 library ieee;
@@ -32,13 +34,17 @@ entity mode_references is
     i_d_source : in  signed(PU_W - 1 downto 0);
     i_q_ext    : in  signed(PU_W - 1 downto 0);
     torque_ref : in  signed(PU_W - 1 downto 0);
+    omega_me   : in  signed(PU_W - 1 downto 0);
+    omega_ref  : in  signed(PU_W - 1 downto 0);
     by_voltage : in  std_logic;
+    by_speed   : in  std_logic;
     regulates  : in  std_logic;
     run        : in  std_logic;
     u_d_ext    : in  signed(PU_W - 1 downto 0);
     u_q_ext    : in  signed(PU_W - 1 downto 0);
     u_step     : in  signed(PU_W - 1 downto 0);
     i_step     : in  signed(PU_W - 1 downto 0);
+    omega_step : in  signed(PU_W - 1 downto 0);
     out_valid  : out std_logic;
     u_d_now    : out signed(PU_W - 1 downto 0);
     u_q_now    : out signed(PU_W - 1 downto 0);
@@ -46,6 +52,8 @@ entity mode_references is
     i_q_now    : out signed(PU_W - 1 downto 0);
     hold_d     : out std_logic;
     hold_q     : out std_logic;
+    omega_now  : out signed(PU_W - 1 downto 0);
+    hold_omega : out std_logic;
     u_rest_d   : out signed(PU_W - 1 downto 0);
     u_rest_q   : out signed(PU_W - 1 downto 0)
   );
@@ -72,16 +80,19 @@ architecture rtl of mode_references is
 begin
   valid(0) <= in_valid;
 
-  -- What enters: u_d, u_q, i_d, i_q
-  target_0 <= i_q_ext when valid(3) = '1' else
+  -- What enters: u_d, u_q, i_d, i_q, omega
+  target_0 <= omega_ref when valid(4) = '1' else
+              i_q_ext when valid(3) = '1' else
               i_d_source when valid(2) = '1' else
               u_q_ext when valid(1) = '1' else
               u_d_ext;
-  now_0    <= i_q_now when valid(3) = '1' else
+  now_0    <= omega_now when valid(4) = '1' else
+              i_q_now when valid(3) = '1' else
               i_d_now when valid(2) = '1' else
               u_q_now when valid(1) = '1' else
               u_d_now;
-  most_0   <= i_step when valid(2) = '1' or valid(3) = '1' else u_step;
+  most_0   <= omega_step when valid(4) = '1' else
+              i_step when valid(2) = '1' or valid(3) = '1' else u_step;
   u_0      <= u_q when valid(1) = '1' else u_d;
   comp_0   <= u_comp_q when valid(1) = '1' else u_comp_d;
   dec_1    <= u_dec_q when valid(2) = '1' else u_dec_d;
@@ -112,7 +123,7 @@ begin
       free_2  <= saturate(free_1, PU_W);
       rest_2  <= saturate(resize(free_1, PU_W + 2) - dec_1, PU_W);
 
-      -- Stages 3 to 6: the references of the next sample, one after another
+      -- Stages 3 to 7: the references of the next sample, one after another
       if valid(2) = '1' then
         u_d_now  <= moved_2 when by_voltage = '1' else free_2;
         u_rest_d <= rest_2;
@@ -134,13 +145,19 @@ begin
         end if;
         hold_q <= by_voltage or regulates or (hold_q and past_2);
       end if;
-      if run = '0' and (or valid(2 to 5)) = '1' then
-        u_d_now <= (others => '0');
-        u_q_now <= (others => '0');
-        i_d_now <= (others => '0');
-        i_q_now <= (others => '0');
-        hold_d  <= '0';
-        hold_q  <= '0';
+      if valid(6) = '1' then
+        omega_now  <= moved_2 when by_speed = '1' else omega_me;
+        hold_omega <= not by_speed or (hold_omega and past_2);
+      end if;
+      if run = '0' and (or valid(2 to 6)) = '1' then
+        u_d_now    <= (others => '0');
+        u_q_now    <= (others => '0');
+        i_d_now    <= (others => '0');
+        i_q_now    <= (others => '0');
+        omega_now  <= (others => '0');
+        hold_d     <= '0';
+        hold_q     <= '0';
+        hold_omega <= '0';
       end if;
 
       if rst = '1' then
@@ -149,8 +166,10 @@ begin
         u_q_now             <= (others => '0');
         i_d_now             <= (others => '0');
         i_q_now             <= (others => '0');
+        omega_now           <= (others => '0');
         hold_d              <= '0';
         hold_q              <= '0';
+        hold_omega          <= '0';
         u_rest_d            <= (others => '0');
         u_rest_q            <= (others => '0');
       end if;

@@ -816,6 +816,10 @@ begin
         settings.i_step <= signed(held(17 downto 0));
         written(179)    <= '1';
       end if;
+      if MODES = 1 and (row(22) and column(4) and not sample_busy) = '1' then
+        settings.omega_step <= signed(held(17 downto 0));
+        written(180)        <= '1';
+      end if;
       if RESIDUAL = 1 and (row(26) and column(0) and not sample_busy) = '1' then
         settings.residual_min <= unsigned(held(16 downto 0));
         written(208)          <= '1';
@@ -1254,6 +1258,7 @@ begin
         settings.u_q_ext          <= (others => '0');
         settings.u_step           <= (others => '0');
         settings.i_step           <= (others => '0');
+        settings.omega_step       <= to_signed(1, 18);
         settings.residual_min     <= (others => '0');
         settings.residual_w       <= (others => '0');
         settings.residual_i       <= (others => '0');
@@ -1522,7 +1527,9 @@ begin
   shown(74 to 98)   <= (others => (others => '0'));
   shown(99)         <= x"00000100";
   shown(100)        <= x"00001000";
-  shown(101 to 183) <= (others => (others => '0'));
+  shown(101 to 179) <= (others => (others => '0'));
+  shown(180)        <= x"00000001";
+  shown(181 to 183) <= (others => (others => '0'));
   shown(184)        <= "" & std_logic_vector(resize(observed.shaft_position, 32));
   shown(185)        <= "" & std_logic_vector(resize(observed.position_error, 32));
   shown(186 to 213) <= (others => (others => '0'));

@@ -132,6 +132,7 @@ package fluxproof_pkg is
     u_q_ext          : signed(PU_W - 1 downto 0);  -- voltage of voltage mode, q axis
     u_step           : signed(PU_W - 1 downto 0);  -- largest change of a voltage of voltage mode per sample
     i_step           : signed(PU_W - 1 downto 0);  -- largest change of a current reference per sample after a change of modes
+    omega_step       : signed(PU_W - 1 downto 0);  -- largest change of the speed reference per sample after a change of modes
     min_pulse        : unsigned(11 downto 0);  -- shortest pulse of a leg, clocks
     double_update    : std_logic;  -- 1: sample and update at the peak too; taken while the gates are off
     omega_0          : unsigned(15 downto 0);  -- crossover of the two models, times the sample time
@@ -461,7 +462,7 @@ package fluxproof_pkg is
   constant MODE_CHANGE_POSITION : natural := 3;
 
   -- mode_references: none: docs/modes.md
-  constant MODE_REFERENCES_LATENCY : positive := 6;
+  constant MODE_REFERENCES_LATENCY : positive := 7;
 
   -- position_control: none: docs/position.md
   constant POSITION_CONTROL_LATENCY : positive := 7;
