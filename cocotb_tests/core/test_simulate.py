@@ -19,8 +19,10 @@ from fluxproof.cosim.driven_plant import Scenario
 from fluxproof.cosim.sensor_edges import edges_of
 from fluxproof.simulate import scene
 from fluxproof.simulate.margins import current_loop, margins, speed_loop, turning_current_loop
+from fluxproof.simulate.run import Run
 from fluxproof.simulate.run import run as simulated_run
 from fluxproof.simulate.session import simulate
+from fluxproof.simulate.verdict import judge
 from golden_model.board_registers import core_changes
 from golden_model.drive import load
 from golden_model.drive_keys import DriveError
@@ -150,6 +152,31 @@ def test_trip(tmp_path, capsys):
     assert status == 1 and data["status"] == "tripped"
     assert re.search(r"tripped by overcurrent at [\d.]+ ms, in the stage '", err)
     assert data["figures"]["Currents"]["i_q_tracking_reversal"]["value"] == 0.0  # off: reference and current are zero
+
+
+def test_the_gates_come_on_a_turning_shaft_as_in_a_drive():
+    """With a tenth of the inductance a period of zero voltage at rated speed is 1.5 times the trip."""
+    drive = load(DRIVES / "servo_24v.toml")
+    m = drive.machine
+    low = dataclasses.replace(m, inductance_d_h=0.1 * m.inductance_d_h, inductance_q_h=0.1 * m.inductance_q_h)
+    drive = dataclasses.replace(drive, machine=low)
+    found = simulated_run(drive, registers(drive), scene.fast_current_step(drive))
+    assert found.tripped_at is None, found.faults
+
+
+def test_every_scene_that_trips_is_named():
+    """The main scene first; what braking needs stands beside the trip of the bus alone."""
+    drive = load(DRIVES / "servo_24v.toml")
+
+    def tripped(stage, *faults):
+        of = scene.Scene(None, (scene.Stage(stage, 0, 9, 0.0),))
+        return Run(of, np.arange(9) * 1e-3, {}, np.zeros((9, 3)), 2, faults)
+
+    runs = [tripped("reversal", "u_dc_high"), tripped("before", "overcurrent")]
+    status, reason = judge(drive, {}, runs, back="it needs a resistor")
+    assert status == "tripped"
+    first, second = reason.split("; ")
+    assert first.endswith("'reversal': it needs a resistor") and second.endswith("in the stage 'before'")
 
 
 def fed(name, **keys):

@@ -29,6 +29,7 @@ LONGEST_S = 1.0  # an acceleration that takes longer is one to a lower speed
 MOST_PERIODS = 1_000_000  # about half a minute of computing
 SETTLE = 30.0  # over the crossover of the speed loop [rad/s]: six time constants of its integral
 STEP_SAMPLES = 300  # before and after the step of the current
+OFF_SAMPLES = 60  # of these: on a shaft that turns the gates come on when the core knows the speed, as in a drive
 STEP_OF_LIMIT = 0.3
 OF_STEP = 0.7  # of the speed at which the step's current fills the voltage circle: the rest makes the step
 
@@ -204,7 +205,8 @@ def fastest(drive: Drive) -> float:
 def _current_step(drive: Drive, speed: float) -> Scene:
     size = STEP_OF_LIMIT * drive.current_limit_a
     i_q = np.repeat([0.0, size], STEP_SAMPLES)
-    driven = replace(_driven(drive, np.full(len(i_q), speed), i_q), omega_m=speed)
+    enable = (np.arange(len(i_q)) >= OFF_SAMPLES).astype(np.int64)
+    driven = replace(_driven(drive, np.full(len(i_q), speed), i_q), omega_m=speed, enable=enable)
     if drive.core.references:  # the step is one of the current regulators, without the table
         codes = np.array([from_si("i_q_ext", value, drive) for value in i_q], np.int64)
         driven = replace(driven, i_q_ext=codes, changes={0: {"use_table": 0}})

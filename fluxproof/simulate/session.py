@@ -50,13 +50,13 @@ def simulate(
     rippled = ripple(drive, main, loaded.end, _turn(drive, main, loaded.end))
     back = regeneration(drive, _untripped(drive, register_set, main))
     tripped = trip(drive, register_set)
-    runs = [step, fast, main, *([] if moved is None else [moved])]
+    runs = [main, step, fast, *([] if moved is None else [moved])]
     highest = max(float(each["true_u_dc"].max()) for each in runs)
-    status, reason = verdict.judge(drive, found, runs, beyond(drive, tripped, highest))
+    over = beyond(drive, tripped, highest)
+    needed = told(drive, back) if "u_dc_high" in main.faults else ""
+    status, reason = verdict.judge(drive, found, runs, over, needed)
     if status == "ok":
         reason = "; ".join(filter(None, (reason, unjudged(drive, tripped))))
-    if status == "tripped" and "u_dc_high" in main.faults:
-        reason = f"{reason}: {told(drive, back)}"
     data = {
         "drive": name,
         "status": status,

@@ -23,17 +23,20 @@ LEARNT = 0.8  # of the loss of dead time and devices
 OF_SPEED, OF_CURRENT = 0.03, 0.1  # largest error of a settled stage: of the rated speed, rms of the current limit
 
 
-def judge(drive: Drive, loops: dict[str, Margins], runs: list[Run], overvoltage: str = "") -> tuple[str, str]:
-    """(status, reason): "ok", "unstable", "tripped", "not_settled" or "overvoltage"; the first that applies."""
+def judge(
+    drive: Drive, loops: dict[str, Margins], runs: list[Run], overvoltage: str = "", back: str = ""
+) -> tuple[str, str]:
+    """(status, reason): "ok", "unstable", "tripped", "not_settled" or "overvoltage"; the first that applies.
+
+    overvoltage: what a trip at top speed does to the bus, if it is beyond a rating; back: what braking feeds back.
+    """
     for name, margins in loops.items():
         if not margins.stable:
             size = f"a pole of the closed loop has the magnitude {margins.pole:.4f}"
             return "unstable", f"the {name} is unstable: {size}"
-    for run in runs:
-        if run.tripped_at is not None:
-            stage = next(s for s in run.scene.stages if s.first <= run.tripped_at < s.end)
-            at = f"at {run.t[run.tripped_at] * 1e3:.1f} ms, in the stage {stage.name!r}"
-            return "tripped", f"tripped by {', '.join(run.faults)} {at}{_overspeed(drive, run)}"
+    trips = [_tripped(drive, run, back) for run in runs if run.tripped_at is not None]
+    if trips:
+        return "tripped", "; ".join(trips)
     for run in runs:
         reason = unsettled(drive, run)
         if reason:
@@ -44,6 +47,16 @@ def judge(drive: Drive, loops: dict[str, Margins], runs: list[Run], overvoltage:
     margin = loops[slow].phase_margin_deg
     least = "" if margin is None else f"; least phase margin {margin:.0f} degrees, {slow}"
     return "ok", f"stable in every stage, no trip{least}"
+
+
+def _tripped(drive: Drive, run: Run, back: str) -> str:
+    """Which faults end a run, when, in which stage of its scene, and what to do about them."""
+    at = run.tripped_at or 0
+    stage = next(s for s in run.scene.stages if s.first <= at < s.end)
+    told = f"tripped by {', '.join(run.faults)} at {run.t[at] * 1e3:.1f} ms, in the stage {stage.name!r}"
+    if back and "u_dc_high" in run.faults:
+        return f"{told}: {back}"
+    return told + _overspeed(drive, run)
 
 
 def _overspeed(drive: Drive, run: Run) -> str:
