@@ -82,7 +82,7 @@ def test_the_torque_that_accelerates_a_rotor_is_not_lost(nominal):
     n = 4000
     speed = np.concatenate([np.full(n, -400.0), np.linspace(-400.0, 400.0, 400), np.full(n, 400.0)])
     t, current = 1e-4 * np.arange(len(speed)), np.full(len(speed), 3.0)
-    torque = 1.5 * PAIRS * PSI * current - 1e-4 * np.gradient(speed, t)
+    torque = 1.5 * PAIRS * PSI * current - 1.5e-4 * np.gradient(speed, t)
     columns = {"t": t, "omega_e": speed, "i_d": 0.0 * t, "i_q": current, "torque": torque}
     recording = from_columns(columns, 1e-4)
     torque_lost.check(recording, nominal)

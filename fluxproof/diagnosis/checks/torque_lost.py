@@ -2,8 +2,8 @@
 """Rows in which a current flows and the shaft has no torque: the angle was lost, or the coupling slipped.
 
 A control that has lost its angle drives its current along the magnets: the current stays at its limit, and a transducer
-shows nearly nothing of the torque that it gives elsewhere in the recording.  In a log, the rotor's inertia takes as much
-while the speed changes, so that only rows that are operating points count.
+shows nearly nothing of the torque that it gives elsewhere in the recording.  In a log, the rotor's inertia takes
+as much while the speed changes, so that only rows that are operating points count.
 """
 
 from __future__ import annotations
