@@ -10,7 +10,6 @@ grid the map is extrapolated linearly with the slope at the border.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import isotonic_regression
 
 from fluxproof.plant.jit import njit
 
@@ -98,6 +97,8 @@ class FluxMap:
 
 def _rising(lines, floor):
     """Isotonic regression of every row, with a least step of floor x the median one."""
+    from scipy.optimize import isotonic_regression  # takes 0.7 s of all commands, most of which have no map
+
     ramp = floor * np.median(np.diff(lines, axis=1)) * np.arange(lines.shape[1])
     rising = np.array([isotonic_regression(line - ramp).x + ramp for line in lines])
     untouched = np.abs(rising - lines) < 1e-12 * np.abs(lines).max()

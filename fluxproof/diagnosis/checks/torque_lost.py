@@ -2,7 +2,8 @@
 """Rows in which a current flows and the shaft has no torque: the angle was lost, or the coupling slipped.
 
 A control that has lost its angle drives its current along the magnets: the current stays at its limit, and a transducer
-shows nearly nothing of the torque that it gives elsewhere in the recording.
+shows nearly nothing of the torque that it gives elsewhere in the recording.  In a log, the rotor's inertia takes
+as much while the speed changes, so that only rows that are operating points count.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ MOST = 0.2  # share of the loaded rows: with more, what is usual is not known
 
 
 def check(recording, nominal) -> None:
-    if not recording.has("torque", "omega_e") or (i := current_of(recording)) is None:
+    if not recording.points or not recording.has("torque", "omega_e") or (i := current_of(recording)) is None:
         return
     driving, torque = airgap(nominal, i), recording["torque"]
     good = recording.usable & np.isfinite(torque) & np.isfinite(driving)

@@ -18,7 +18,6 @@ def ambiguities(kept, present, sure, effects) -> tuple[tuple[str, ...], ...]:
     groups = [tuple(sorted(n for n in g if present[n] >= k.OPEN)) for g in alternatives(rest)]
     rules = (
         _has_rivals,
-        lambda g: _is_probable(g, present),
         lambda g: _is_needed(g, kept),
         lambda g: _has_a_parameter(g, effects),
     )
@@ -50,10 +49,6 @@ def alternatives(sets) -> list[set[str]]:
 def _has_rivals(group) -> bool:
     """One effect alone is no ambiguity."""
     return len(group) > 1
-
-
-def _is_probable(group, present) -> bool:
-    return sum(present[n] for n in group) >= k.TOGETHER
 
 
 def _is_needed(group, kept) -> bool:

@@ -74,8 +74,6 @@ ACTED_ON = 2 / 3
 LEFT_OUT = 0.05
 # Least probability of an effect in an ambiguity.
 OPEN = 0.02
-# Least sum of the probabilities of its effects at which an ambiguity is reported.
-TOGETHER = 0.5
 # Difference of an effect's parameter, relative to it, between alternatives that makes it a part of what is not known.
 DEPENDS = 0.2
 # The same in standard deviations, below which the alternatives agree.

@@ -14,7 +14,6 @@ harmonics cancel, less what a changing speed adds to that mean.  An angle error 
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from fluxproof.diagnosis.ground.recording import Problem, Recording, RecordingError
 from fluxproof.diagnosis.ingest.demand import LINE_VOLTAGES, PHASE_VOLTAGES, has_terminal_voltages
@@ -148,6 +147,8 @@ def _pieces(t):
 
 def _resampled(t, v, period):
     """(instants (m,), mean voltage (m,) complex of the periods that begin with them); None if too short."""
+    from scipy.interpolate import CubicSpline  # takes a part of a second, and few recordings are EMF runs
+
     count = int(np.floor((t[-1] - t[0]) / period * (1.0 + 1e-12)))
     if count < 4:
         return None
