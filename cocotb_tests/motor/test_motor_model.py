@@ -36,10 +36,11 @@ def test_motor_in_verilator():
 
 
 @pytest.mark.slow
-def test_core_and_motor_in_one():
+@pytest.mark.parametrize("filter_s", [0.0, closed_loop.FILTER_S])
+def test_core_and_motor_in_one(filter_s):
     """The loop closed in the RTL alone: gates at every clock, the last sample's values, a load step in the middle."""
     skip_without_ghdl5()
-    golden, rtl = closed_loop.compare(40)
+    golden, rtl = closed_loop.compare(40, filter_s)
     wrong = np.flatnonzero(golden.words != rtl.words)
     assert not len(wrong), f"gates differ at clock {wrong[0]}"
     assert rtl.observed[-1] == golden.observed[-1]
@@ -67,7 +68,7 @@ def test_compiled_loop_is_the_clocked_one():
     clocked = closed_loop.golden_run(of, periods, 1 << 40).observed
     asked = np.array([[*closed_loop.references(of).values(), 0]] * periods, np.int64)
     u_dc = of.scale.u_dc(of.drive.inverter.dc_bus_v)
-    hil = golden.Hil(of.core.values, of.core.config, of.motor, of.tables, of.sensors, u_dc, of.bus)
+    hil = golden.Hil(of.core.values, of.core.config, of.motor, of.tables, of.sensors, u_dc, of.bus, of.k_filter)
     _, observed = golden.record(hil, asked, golden.constant(of.motor, periods))
     for k, row in enumerate(clocked):
         assert row == {name: int(values[k]) for name, values in observed.items()}, f"sample {k}"

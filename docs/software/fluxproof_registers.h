@@ -1894,6 +1894,12 @@ extern "C" {
 #define FLUXPROOF__MOTOR_HALL_OFFSET__VALUE_bw 25
 #define FLUXPROOF__MOTOR_HALL_OFFSET__VALUE_reset 0x0
 
+// reg - fluxproof::motor_k_filter
+#define FLUXPROOF__MOTOR_K_FILTER__VALUE_bm 0x1ffff
+#define FLUXPROOF__MOTOR_K_FILTER__VALUE_bp 0
+#define FLUXPROOF__MOTOR_K_FILTER__VALUE_bw 17
+#define FLUXPROOF__MOTOR_K_FILTER__VALUE_reset 0x0
+
 // reg - fluxproof::motor_table_select
 #define FLUXPROOF__MOTOR_TABLE_SELECT__VALUE_bm 0x3
 #define FLUXPROOF__MOTOR_TABLE_SELECT__VALUE_bp 0
@@ -2313,7 +2319,8 @@ typedef struct {
     uint32_t motor_angle_offset;
     uint32_t motor_counts;
     uint32_t motor_hall_offset;
-    uint8_t RESERVED_8b4_8bf[0xc];
+    uint32_t motor_k_filter;
+    uint8_t RESERVED_8b8_8bf[0x8];
     uint32_t motor_table_select;
     uint32_t motor_table_at;
     uint32_t motor_table_high;

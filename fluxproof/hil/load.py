@@ -85,6 +85,7 @@ def sensor_registers(drive: Drive, sensors: Sensors, current_a: float, voltage_v
         "angle_offset": round(turns / MOTOR_ANGLE.lsb) % (1 << MOTOR_ANGLE.width),
         "counts": counts or 0,
         "hall_offset": 0,
+        "k_filter": 0,  # no key of a drive file describes it
     }
 
 

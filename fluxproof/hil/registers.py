@@ -4,6 +4,7 @@
 scale = motor_scale(machine, u_dc_v, current_a, clock_hz)
 registers, tables = motor_registers(scale, machine, inverter), motor_tables(scale, machine)
 bus_registers(scale, bus)                            of the bus; the source's voltage is scale.u_dc(volts)
+filter_register(scale, time_constant_s)              of the filter of the current sensors
 machine_of(scale, registers, machine, inverter)      what the rounded registers say, in SI units
 """
 
@@ -19,7 +20,7 @@ from fluxproof.plant.inverter import Inverter
 from fluxproof.plant.pmsm import SATURATED, Machine, currents_from_flux, harmonic_flux, machine_params
 from golden_model.fixed import Format
 from golden_model.formats import FLUX, MOTOR_SPEED, MOTOR_VOLTAGE, MOTOR_WAVE
-from golden_model.motor import motor_bus, motor_model
+from golden_model.motor import motor_bus, motor_filter, motor_model
 from golden_model.motor.motor_angle import POINTS
 from golden_model.motor.motor_current import POINT
 from golden_model.motor.motor_flux import CLOCKS_BITS
@@ -122,6 +123,16 @@ def bus_registers(scale: Scale, bus: Bus) -> motor_bus.Registers:
         k_brake=code("k_brake", share / bus.brake_ohm, ports["k_brake"]),
         rectifier=int(bus.diode),
     )
+
+
+def filter_register(scale: Scale, time_constant_s: float) -> int:
+    """Register of the current sensors' filter; 0: none.  ValueError for a time constant that rounds to none."""
+    if time_constant_s == 0.0:
+        return 0
+    share = code("k_filter", -math.expm1(-scale.step_s / time_constant_s), motor_filter.SHARE)
+    if share == 0:
+        raise ValueError(f"motor: k_filter: {time_constant_s:.6g} s is beyond {scale.step_s * motor_filter.MOST:.3g} s")
+    return share
 
 
 def motor_tables(scale: Scale, machine: Machine) -> Tables:

@@ -322,6 +322,7 @@ ADDRESSES = {
     "motor_angle_offset": 0x8A8,
     "motor_counts": 0x8AC,
     "motor_hall_offset": 0x8B0,
+    "motor_k_filter": 0x8B4,
     "motor_table_select": 0x8C0,
     "motor_table_at": 0x8C4,
     "motor_table_high": 0x8C8,

@@ -4,15 +4,18 @@
 The bus voltage that stands at a tick holds for the step that begins, also for the sensors; while the motor starts it
 is that of the source.  The charge of the step that
 ends, by the currents that stood at its tick, and the brake resistor at this tick change the voltage of the next one.
+The sensors' filter takes the currents that stand at a tick; its outputs are there FILTERED_AT clocks later.
 """
 
 from typing import NamedTuple
 
 from golden_model.kernel import kernel
-from golden_model.motor import motor_bus, motor_charge, motor_model
+from golden_model.motor import motor_bus, motor_charge, motor_filter, motor_model
 
 bus_step, of_step, motor_step = motor_bus.step, motor_charge.of_step, motor_model.step
-Inputs, DROP_U = motor_model.Inputs, motor_bus.DROP_U
+filter_step = motor_filter.step
+Inputs, DROP_U, STEP = motor_model.Inputs, motor_bus.DROP_U, motor_model.STEP
+FILTERED_AT = 2 + motor_filter.BLOCK.latency
 
 
 class State(NamedTuple):
@@ -20,10 +23,13 @@ class State(NamedTuple):
     bus: motor_bus.State = motor_bus.State()
     u_dc: int = 0  # since the last tick
     u_dc_1: int = 0  # in the step before
+    filter: motor_filter.State = motor_filter.State()
+    filtered: tuple = (0,) * 3  # phases a, b, c
+    filtered_1: tuple = (0,) * 3  # of the step before
 
 
 @kernel
-def step(state, inputs, brake, regs, of_bus, tables, clocks):
+def step(state, inputs, brake, regs, of_bus, k_filter, tables, clocks):
     """One step: (state, what stands at the motor's outputs at its tick); ``inputs.u_dc`` is that of the source."""
     x, before = inputs, state.motor.chain_4
     start = 1 if x.start or state.motor.starting > 0 else 0
@@ -38,4 +44,13 @@ def step(state, inputs, brake, regs, of_bus, tables, clocks):
     )
     now = Inputs(u_dc, x.load, x.start, x.high_a, x.low_a, x.high_b, x.low_b, x.high_c, x.low_c)
     motor, shown = motor_step(state.motor, now, regs, tables, clocks)
-    return State(motor, bus, u_dc, state.u_dc), shown
+    of_filter, filtered = filter_step(state.filter, shown.i_a, shown.i_b, shown.i_c, k_filter)
+    return State(motor, bus, u_dc, state.u_dc, of_filter, filtered, state.filtered), shown
+
+
+@kernel
+def converted(state, chain, clock, k_filter):
+    """The currents that the converters see at a clock; ``chain``: what stands at the motor's outputs."""
+    if k_filter == 0:
+        return chain.i_a, chain.i_b, chain.i_c
+    return state.filtered if clock % STEP >= FILTERED_AT else state.filtered_1

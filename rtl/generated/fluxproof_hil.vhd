@@ -193,6 +193,7 @@ architecture rtl of fluxproof_hil is
   signal motor_angle_offset  : unsigned(24 downto 0);
   signal motor_counts        : unsigned(15 downto 0);
   signal motor_hall_offset   : unsigned(24 downto 0);
+  signal motor_k_filter      : unsigned(16 downto 0);
   signal motor_table_select  : unsigned(1 downto 0);
   signal motor_table_at      : unsigned(11 downto 0);
   signal motor_table_high    : unsigned(17 downto 0);
@@ -510,6 +511,7 @@ begin
       motor_angle_offset  => motor_angle_offset,
       motor_counts        => motor_counts,
       motor_hall_offset   => motor_hall_offset,
+      motor_k_filter      => motor_k_filter,
       motor_table_select  => motor_table_select,
       motor_table_at      => motor_table_at,
       motor_table_high    => motor_table_high,
@@ -956,6 +958,7 @@ begin
       motor_zero_b        => motor_zero_b,
       motor_zero_c        => motor_zero_c,
       motor_zero_u        => motor_zero_u,
+      motor_k_filter      => motor_k_filter,
       motor_noise_i       => motor_noise_i,
       motor_noise_u       => motor_noise_u,
       motor_angle_offset  => motor_angle_offset,

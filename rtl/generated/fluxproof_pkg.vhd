@@ -1461,6 +1461,12 @@ package fluxproof_pkg is
   -- motor_encoder: docs/hil.md: sensors
   constant MOTOR_ENCODER_LATENCY : positive := 3;
 
+  -- motor_filter: docs/hil.md: sensors
+  constant MOTOR_FILTER_LATENCY : positive := 7;
+  constant MOTOR_FILTER_DROP_SEEN : natural := 17;
+  constant MOTOR_FILTER_DROP_OUT : natural := 23;
+  constant MOTOR_FILTER_LIFT : natural := 6;
+
   -- motor_flux: docs/hil.md: d lambda/dt = u - R i
   constant MOTOR_FLUX_LATENCY : positive := 9;
   constant MOTOR_FLUX_DROP_RI : natural := 15;

@@ -177,6 +177,7 @@ entity hil_register_file is
     motor_angle_offset  : out unsigned(24 downto 0);  -- 8a8 angle of the encoder at the motor's zero
     motor_counts        : out unsigned(15 downto 0);  -- 8ac counts of the encoder in a turn
     motor_hall_offset   : out unsigned(24 downto 0);  -- 8b0 electrical angle at which the first sector begins
+    motor_k_filter      : out unsigned(16 downto 0);  -- 8b4 share of a step in the filter of the current sensors; 0: no filter
     motor_table_select  : out unsigned(1 downto 0);  -- 8c0 0 map, 1 harmonic fluxes, 2 cogging
     motor_table_at      : out unsigned(11 downto 0);  -- 8c4 address of the word: row and column of the map, or share of the turn
     motor_table_high    : out unsigned(17 downto 0);  -- 8c8 the word's d axis
@@ -1325,6 +1326,10 @@ begin
         motor_hall_offset <= unsigned(held(24 downto 0));
         written(556)      <= '1';
       end if;
+      if (row(69) and column(5)) = '1' then
+        motor_k_filter <= unsigned(held(16 downto 0));
+        written(557)   <= '1';
+      end if;
       if (row(70) and column(0)) = '1' then
         motor_table_select <= unsigned(held(1 downto 0));
         written(560)       <= '1';
@@ -1589,6 +1594,7 @@ begin
         motor_angle_offset        <= (others => '0');
         motor_counts              <= (others => '0');
         motor_hall_offset         <= (others => '0');
+        motor_k_filter            <= (others => '0');
         motor_table_select        <= (others => '0');
         motor_table_at            <= (others => '0');
         motor_table_high          <= (others => '0');

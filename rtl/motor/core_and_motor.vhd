@@ -63,6 +63,7 @@ entity core_and_motor is
     motor_zero_b        : in  signed(PU_W - 1 downto 0);
     motor_zero_c        : in  signed(PU_W - 1 downto 0);
     motor_zero_u        : in  signed(PU_W - 1 downto 0);
+    motor_k_filter      : in  unsigned(16 downto 0);
     motor_noise_i       : in  unsigned(7 downto 0);
     motor_noise_u       : in  unsigned(7 downto 0);
     motor_angle_offset  : in  unsigned(MOTOR_ANGLE_W - 1 downto 0);
@@ -150,7 +151,8 @@ begin
       motor_table_select => motor_table_select, motor_table_at => motor_table_at, motor_scale_a => motor_scale_a,
       motor_scale_b => motor_scale_b, motor_scale_c => motor_scale_c, motor_scale_u => motor_scale_u,
       motor_zero_a => motor_zero_a, motor_zero_b => motor_zero_b, motor_zero_c => motor_zero_c,
-      motor_zero_u => motor_zero_u, motor_noise_i => motor_noise_i, motor_noise_u => motor_noise_u,
+      motor_zero_u => motor_zero_u, motor_k_filter => motor_k_filter, motor_noise_i => motor_noise_i,
+      motor_noise_u => motor_noise_u,
       motor_angle_offset => motor_angle_offset, motor_i_a => motor_i_a, motor_i_b => motor_i_b, motor_i_c => motor_i_c,
       motor_torque => motor_torque, motor_omega_m => motor_omega_m, motor_theta_m => motor_theta_m,
       motor_theta_e => motor_theta_e, motor_inv_c => motor_inv_c, motor_k_source => motor_k_source,

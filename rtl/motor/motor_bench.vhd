@@ -61,6 +61,7 @@ entity motor_bench is
     motor_zero_b        : in  signed(PU_W - 1 downto 0);
     motor_zero_c        : in  signed(PU_W - 1 downto 0);
     motor_zero_u        : in  signed(PU_W - 1 downto 0);
+    motor_k_filter      : in  unsigned(16 downto 0);
     motor_noise_i       : in  unsigned(7 downto 0);
     motor_noise_u       : in  unsigned(7 downto 0);
     motor_angle_offset  : in  unsigned(MOTOR_ANGLE_W - 1 downto 0);
@@ -102,6 +103,12 @@ architecture rtl of motor_bench is
   signal charge    : signed(MOTOR_CHARGE_W - 1 downto 0);
   signal u_bus     : signed(MOTOR_VOLTAGE_W - 1 downto 0);
   signal u_next    : signed(MOTOR_VOLTAGE_W - 1 downto 0);
+  signal y_a       : signed(PU_W - 1 downto 0);
+  signal y_b       : signed(PU_W - 1 downto 0);
+  signal y_c       : signed(PU_W - 1 downto 0);
+  signal i_a_0     : signed(PU_W - 1 downto 0);
+  signal i_b_0     : signed(PU_W - 1 downto 0);
+  signal i_c_0     : signed(PU_W - 1 downto 0);
   signal i_a_1     : signed(PU_W - 1 downto 0);
   signal i_b_1     : signed(PU_W - 1 downto 0);
   signal i_c_1     : signed(PU_W - 1 downto 0);
@@ -115,15 +122,20 @@ begin
   starts <= motor_start or not motor_ready;
   u_next <= motor_u_dc when starts = '1' else u_bus;
 
+  -- What the converters see; without a filter the currents at once
+  i_a_0 <= motor_i_a when motor_k_filter = 0 else y_a;
+  i_b_0 <= motor_i_b when motor_k_filter = 0 else y_b;
+  i_c_0 <= motor_i_c when motor_k_filter = 0 else y_c;
+
   -- Sample and hold
   process (clk)
   begin
     if rising_edge(clk) then
       held <= sample_trigger;
       if sample_trigger = '1' then
-        i_a_1     <= motor_i_a;
-        i_b_1     <= motor_i_b;
-        i_c_1     <= motor_i_c;
+        i_a_1     <= i_a_0;
+        i_b_1     <= i_b_0;
+        i_c_1     <= i_c_0;
         u_dc_1    <= motor_u_bus;
         theta_m_1 <= motor_theta_m;
       end if;
@@ -184,6 +196,12 @@ begin
       ready => motor_ready, i_a => motor_i_a, i_b => motor_i_b, i_c => motor_i_c, torque => motor_torque,
       omega_m => motor_omega_m, theta_m => motor_theta_m, theta_e => motor_theta_e,
       shoot_through => motor_shoot_through
+    );
+
+  current_filter : entity work.motor_filter
+    port map (
+      clk => clk, rst => rst, in_valid => ticked(2), i_a => motor_i_a, i_b => motor_i_b, i_c => motor_i_c,
+      k_filter => motor_k_filter, out_valid => open, y_a => y_a, y_b => y_b, y_c => y_c
     );
 
   sensors : entity work.motor_sensors

@@ -55,8 +55,7 @@ def bench_text(of: Parts, flat_file) -> str:
         "enable": 1,
         "motor_u_dc": of.scale.u_dc(of.drive.inverter.dc_bus_v),
     }
-    own = {**of.motor._asdict(), **of.sensors._asdict(), **of.bus._asdict()}
-    values |= {f"motor_{name}": value for name, value in own.items()}
+    values |= of.of_motor()
     lines = ["library ieee;", "use ieee.std_logic_1164.all;", "use ieee.numeric_std.all;"]
     lines += [
         "use work.fluxproof_pkg.all;",
