@@ -15,7 +15,8 @@ use work.fluxproof_pkg.all;
 entity motor_bench is
   generic (
     ADC_BITS      : positive range 12 to 16 := 12;
-    POSITION_BITS : positive range 12 to 18 := 16
+    POSITION_BITS : positive range 12 to 18 := 16;
+    TEMPERATURES  : natural range 0 to 1    := 1
   );
   port (
     clk                 : in  std_logic;
@@ -62,6 +63,13 @@ entity motor_bench is
     motor_zero_c        : in  signed(PU_W - 1 downto 0);
     motor_zero_u        : in  signed(PU_W - 1 downto 0);
     motor_k_filter      : in  unsigned(16 downto 0);
+    motor_ambient       : in  signed(15 downto 0);
+    motor_t_ref         : in  signed(15 downto 0);
+    motor_heating       : in  unsigned(23 downto 0);
+    motor_k_winding     : in  unsigned(20 downto 0);
+    motor_k_magnet      : in  unsigned(20 downto 0);
+    motor_tcr_winding   : in  unsigned(16 downto 0);
+    motor_tcr_magnet    : in  unsigned(16 downto 0);
     motor_noise_i       : in  unsigned(7 downto 0);
     motor_noise_u       : in  unsigned(7 downto 0);
     motor_angle_offset  : in  unsigned(MOTOR_ANGLE_W - 1 downto 0);
@@ -89,6 +97,8 @@ entity motor_bench is
     motor_theta_m       : out unsigned(MOTOR_ANGLE_W - 1 downto 0);
     motor_theta_e       : out unsigned(MOTOR_ANGLE_W - 1 downto 0);
     motor_u_bus         : out signed(MOTOR_VOLTAGE_W - 1 downto 0);
+    motor_temp_winding  : out signed(15 downto 0);
+    motor_temp_magnet   : out signed(15 downto 0);
     motor_shoot_through : out std_logic
   );
 end entity motor_bench;
@@ -103,6 +113,10 @@ architecture rtl of motor_bench is
   signal charge    : signed(MOTOR_CHARGE_W - 1 downto 0);
   signal u_bus     : signed(MOTOR_VOLTAGE_W - 1 downto 0);
   signal u_next    : signed(MOTOR_VOLTAGE_W - 1 downto 0);
+  signal hot_a     : unsigned(23 downto 0);
+  signal hot_b     : unsigned(23 downto 0);
+  signal hot_c     : unsigned(23 downto 0);
+  signal hot_psi   : signed(FLUX_W - 1 downto 0);
   signal y_a       : signed(PU_W - 1 downto 0);
   signal y_b       : signed(PU_W - 1 downto 0);
   signal y_c       : signed(PU_W - 1 downto 0);
@@ -184,12 +198,34 @@ begin
       rectifier => motor_rectifier, out_valid => open, u_dc => u_bus
     );
 
+  warm : if TEMPERATURES = 1 generate
+    heat : entity work.motor_heat
+      generic map (WINDOW_BITS => MOTOR_HEAT_WINDOW_BITS)
+      port map (
+        clk => clk, rst => rst, in_valid => ticked(2), i_a => motor_i_a, i_b => motor_i_b, i_c => motor_i_c,
+        start => start_1, r_a => motor_r_a, r_b => motor_r_b, r_c => motor_r_c, psi_m => motor_psi_m,
+        ambient => motor_ambient, t_ref => motor_t_ref, heating => motor_heating, k_winding => motor_k_winding,
+        k_magnet => motor_k_magnet, tcr_winding => motor_tcr_winding, tcr_magnet => motor_tcr_magnet,
+        out_valid => open, hot_a => hot_a, hot_b => hot_b, hot_c => hot_c, hot_psi => hot_psi,
+        temp_winding => motor_temp_winding, temp_magnet => motor_temp_magnet
+      );
+  end generate;
+
+  cold : if TEMPERATURES = 0 generate
+    hot_a              <= motor_r_a;
+    hot_b              <= motor_r_b;
+    hot_c              <= motor_r_c;
+    hot_psi            <= motor_psi_m;
+    motor_temp_winding <= motor_ambient;
+    motor_temp_magnet  <= motor_ambient;
+  end generate;
+
   load_machine : entity work.motor_model
     port map (
       clk => clk, rst => rst, gate_high => gate_high, gate_low => gate_low, u_dc => u_next, load => motor_load,
       start => motor_start, clear_faults => motor_clear_faults, stiffness => motor_stiffness,
-      v_switch => motor_v_switch, v_diode => motor_v_diode, r_a => motor_r_a, r_b => motor_r_b, r_c => motor_r_c,
-      psi_start => motor_psi_start, psi_m => motor_psi_m, inv_l_d => motor_inv_l_d, inv_l_q => motor_inv_l_q,
+      v_switch => motor_v_switch, v_diode => motor_v_diode, r_a => hot_a, r_b => hot_b, r_c => hot_c,
+      psi_start => motor_psi_start, psi_m => hot_psi, inv_l_d => motor_inv_l_d, inv_l_q => motor_inv_l_q,
       k_j => motor_k_j, viscous => motor_viscous, coulomb => motor_coulomb, pole_pairs => motor_pole_pairs,
       hold => motor_hold, omega_set => motor_omega_set, table_write => motor_table_write,
       table_select => motor_table_select, table_at => motor_table_at, table_word => motor_table_high & motor_table_low, tick => tick,

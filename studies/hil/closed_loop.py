@@ -20,11 +20,20 @@ from fluxproof.cosim.golden_clock import GoldenClock
 from fluxproof.cosim.golden_loop import mixed_kernel
 from fluxproof.cosim.sleeping import with_sleep
 from fluxproof.cosim.verilated import VerilatedCore
-from fluxproof.hil.registers import Scale, bus_registers, filter_register, motor_registers, motor_scale, motor_tables
+from fluxproof.hil.registers import (
+    Scale,
+    Thermal,
+    bus_registers,
+    filter_register,
+    heat_registers,
+    motor_registers,
+    motor_scale,
+    motor_tables,
+)
 from fluxproof.plant.bus import Bus
 from golden_model import fluxproof
 from golden_model.drive import Drive, load
-from golden_model.motor import motor_bench, motor_bus, motor_model, motor_sensors, motor_shaft
+from golden_model.motor import motor_bench, motor_bus, motor_heat, motor_model, motor_sensors, motor_shaft
 from golden_model.motor.motor_model import STEP
 from golden_model.registers import RegisterSet, registers
 from golden_model.units import from_si
@@ -39,6 +48,7 @@ MotorInputs, bench_step = motor_model.Inputs, motor_bench.step
 SPEED_RAD_S, LOAD_NM = 100.0, 0.1
 BUS = Bus(capacitance=470e-6, source_ohm=0.1, diode=True, brake_ohm=5.0)
 FILTER_S = 5e-6  # of the current sensors
+THERMAL = Thermal(0.2, 0.3, 0.4, 0.6, 60.0)  # so small a winding that some milliseconds warm it
 PERIODS = 300
 HELD = 200  # periods of a speed
 
@@ -54,10 +64,12 @@ class Parts(NamedTuple):
     sensors: motor_sensors.Registers
     bus: motor_bus.Registers
     k_filter: int
+    heat: motor_heat.Own
 
     def of_motor(self) -> dict[str, int]:
         """The registers of motor, sensors and bus by name."""
-        own = {**self.motor._asdict(), **self.sensors._asdict(), **self.bus._asdict(), "k_filter": self.k_filter}
+        own = {**self.motor._asdict(), **self.sensors._asdict(), **self.bus._asdict(), **self.heat._asdict()}
+        own |= {"k_filter": self.k_filter}
         return {f"motor_{name}": value for name, value in own.items()}
 
 
@@ -72,12 +84,12 @@ def parts(drive: Drive | None = None) -> Parts:
     still = dict.fromkeys(motor_sensors.Registers._fields, 0) | scales | {"noise_i": 20}
     motor, tables = motor_registers(scale, SERVO, SWITCHES), motor_tables(scale, SERVO)
     bus = bus_registers(scale, BUS)
-    k_filter = filter_register(scale, FILTER_S)
-    return Parts(drive, of_core, scale, motor, tables, motor_sensors.Registers(**still), bus, k_filter)
+    k_filter, heat = filter_register(scale, FILTER_S), heat_registers(scale, SERVO, THERMAL)
+    return Parts(drive, of_core, scale, motor, tables, motor_sensors.Registers(**still), bus, k_filter, heat)
 
 
 @mixed_kernel
-def follow(bench, words, u_dc, load, motor, bus, k_filter, tables):
+def follow(bench, words, u_dc, load, motor, bus, k_filter, heat, tables):
     """The motor through whole steps, from the gates of each of their clocks; the brake resistor stays off."""
     counts = np.zeros(6, np.int64)
     for n in range(len(words) // STEP):
@@ -86,7 +98,7 @@ def follow(bench, words, u_dc, load, motor, bus, k_filter, tables):
             for k in range(6):
                 counts[k] += word >> k & 1
         now = MotorInputs(u_dc, load, 0, counts[0], counts[3], counts[1], counts[4], counts[2], counts[5])
-        bench, _ = bench_step(bench, now, 0, motor, bus, k_filter, tables, STEP)
+        bench, _ = bench_step(bench, now, 0, motor, bus, k_filter, heat, tables, STEP)
     return bench
 
 
@@ -102,14 +114,14 @@ class GoldenMotor:
     def _tick(self, state, load_code):
         inputs = motor_model.Inputs(u_dc=self.u_dc, load=load_code)
         of = self.of
-        return motor_bench.step(state, inputs, 0, of.motor, of.bus, of.k_filter, of.tables, STEP)
+        return motor_bench.step(state, inputs, 0, of.motor, of.bus, of.k_filter, of.heat, of.tables, STEP)
 
     def advance(self, words: np.ndarray, clock: int, load_code: int) -> None:
         """Up to the last tick at or before ``clock``; ``words``: the gates of every clock so far."""
         steps = clock // STEP - self.ticks
         part = words[self.ticks * STEP : (self.ticks + steps) * STEP].astype(np.int64)
         of = self.of
-        self.state = follow(self.state, part, self.u_dc, load_code, of.motor, of.bus, of.k_filter, of.tables)
+        self.state = follow(self.state, part, self.u_dc, load_code, of.motor, of.bus, of.k_filter, of.heat, of.tables)
         self.ticks += steps
 
     def codes(self, clock: int, load_code: int) -> tuple[int, ...]:
@@ -219,7 +231,9 @@ def long_run(periods: int, seed: int = 53) -> Long:
     asked = np.array([[*given.values(), 0]] * periods, np.int64)
     asked[:, list(given).index("omega_ref")] = omega
     u_dc = of.scale.u_dc(of.drive.inverter.dc_bus_v)
-    hil = golden_loop.Hil(of.core.values, of.core.config, of.motor, of.tables, of.sensors, u_dc, of.bus, of.k_filter)
+    hil = golden_loop.Hil(
+        of.core.values, of.core.config, of.motor, of.tables, of.sensors, u_dc, of.bus, of.k_filter, of.heat
+    )
     _, observed = golden_loop.record(hil, asked, golden_loop.constant(of.motor, periods))
     names = list(observed)
     wanted = np.stack([observed[name] for name in names], axis=1)
