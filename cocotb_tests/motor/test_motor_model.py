@@ -67,11 +67,7 @@ def test_compiled_loop_is_the_clocked_one():
     of = of._replace(motor=of.motor._replace(hold=1, omega_set=speed))
     clocked = closed_loop.golden_run(of, periods, 1 << 40).observed
     asked = np.array([[*closed_loop.references(of).values(), 0]] * periods, np.int64)
-    u_dc = of.scale.u_dc(of.drive.inverter.dc_bus_v)
-    hil = golden.Hil(
-        of.core.values, of.core.config, of.motor, of.tables, of.sensors, u_dc, of.bus, of.k_filter, of.heat
-    )
-    _, observed = golden.record(hil, asked, golden.constant(of.motor, periods))
+    _, observed = golden.record(of.hil(), asked, golden.constant(of.motor, periods))
     for k, row in enumerate(clocked):
         assert row == {name: int(values[k]) for name, values in observed.items()}, f"sample {k}"
     assert len(clocked) == periods - 1 and abs(clocked[-1]["omega_me"]) > 1000

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -48,6 +48,7 @@ MotorInputs, bench_step = motor_model.Inputs, motor_bench.step
 SPEED_RAD_S, LOAD_NM = 100.0, 0.1
 BUS = Bus(capacitance=470e-6, source_ohm=0.1, diode=True, brake_ohm=5.0)
 FILTER_S = 5e-6  # of the current sensors
+COPPER = replace(SERVO, resistance_temp_coeff_per_k=0.0039, magnet_temp_coeff_per_k=-0.001)
 THERMAL = Thermal(0.2, 0.3, 0.4, 0.6, 60.0)  # so small a winding that some milliseconds warm it
 PERIODS = 300
 HELD = 200  # periods of a speed
@@ -65,6 +66,14 @@ class Parts(NamedTuple):
     bus: motor_bus.Registers
     k_filter: int
     heat: motor_heat.Own
+
+    def hil(self) -> golden_loop.Hil:
+        """What the compiled loop takes."""
+        u_dc = self.scale.u_dc(self.drive.inverter.dc_bus_v)
+        values, config = self.core.values, self.core.config
+        return golden_loop.Hil(
+            values, config, self.motor, self.tables, self.sensors, u_dc, self.bus, self.k_filter, self.heat
+        )
 
     def of_motor(self) -> dict[str, int]:
         """The registers of motor, sensors and bus by name."""
@@ -84,7 +93,7 @@ def parts(drive: Drive | None = None) -> Parts:
     still = dict.fromkeys(motor_sensors.Registers._fields, 0) | scales | {"noise_i": 20}
     motor, tables = motor_registers(scale, SERVO, SWITCHES), motor_tables(scale, SERVO)
     bus = bus_registers(scale, BUS)
-    k_filter, heat = filter_register(scale, FILTER_S), heat_registers(scale, SERVO, THERMAL)
+    k_filter, heat = filter_register(scale, FILTER_S), heat_registers(scale, COPPER, THERMAL)
     return Parts(drive, of_core, scale, motor, tables, motor_sensors.Registers(**still), bus, k_filter, heat)
 
 
@@ -230,11 +239,7 @@ def long_run(periods: int, seed: int = 53) -> Long:
     given = references(of)
     asked = np.array([[*given.values(), 0]] * periods, np.int64)
     asked[:, list(given).index("omega_ref")] = omega
-    u_dc = of.scale.u_dc(of.drive.inverter.dc_bus_v)
-    hil = golden_loop.Hil(
-        of.core.values, of.core.config, of.motor, of.tables, of.sensors, u_dc, of.bus, of.k_filter, of.heat
-    )
-    _, observed = golden_loop.record(hil, asked, golden_loop.constant(of.motor, periods))
+    _, observed = golden_loop.record(of.hil(), asked, golden_loop.constant(of.motor, periods))
     names = list(observed)
     wanted = np.stack([observed[name] for name in names], axis=1)
 
