@@ -150,8 +150,7 @@ def filter_register(scale: Scale, time_constant_s: float) -> int:
 def heat_registers(scale: Scale, machine: Machine, thermal: Thermal | None = None) -> motor_heat.Own:
     """Registers of the temperatures; ValueError where a value does not fit.
 
-    Without thermal bodies winding and magnets stay at the temperatures of the machine, whose R and magnet flux are
-    those of temperature_ref_c.
+    Without thermal bodies nothing depends on a temperature.
     """
     ports = {p.name: p.fmt for p in motor_heat.OWN}
     window_s = scale.step_s * 2.0**motor_heat.WINDOW_BITS

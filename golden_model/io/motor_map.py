@@ -68,8 +68,9 @@ _UNITS = {  # what 1.0 is: the bases of fluxproof/hil/registers.py
     "U_motor": "u_dc u_bus v_switch v_diode", "I_motor": "i_a i_b i_c zero_a zero_b zero_c",
     "psi_motor": "psi_start psi_m",
     "T_motor": "load coulomb torque", "U_motor/I_motor": "r_a r_b r_c stiffness",
-    "I_motor/psi_motor": "inv_l_d inv_l_q", "U_motor/(I_motor clock)": "inv_c", "1/step": "k_source k_brake k_filter", "1/window": "k_winding k_magnet",
-    "degC": "ambient t_ref temp_winding temp_magnet", "degC/(I_motor^2 window)": "heating", "1/K": "tcr_winding tcr_magnet",
+    "I_motor/psi_motor": "inv_l_d inv_l_q", "U_motor/(I_motor clock)": "inv_c",
+    "1/step": "k_source k_brake k_filter", "1/window": "k_winding k_magnet", "1/K": "tcr_winding tcr_magnet",
+    "degC": "ambient t_ref temp_winding temp_magnet", "degC/(I_motor^2 window)": "heating",
     "turn": "angle_offset hall_offset theta_m theta_e", "turn/step": "omega_set omega_m", "turn/step^2/T_motor": "k_j",
     "T_motor step/turn": "viscous",
 }  # fmt: skip
@@ -79,9 +80,8 @@ UNITS = {PREFIX + name: unit for unit, names in _UNITS.items() for name in names
 def settings() -> dict[str, Port]:
     """The ports of the registers that software writes, without the prefix."""
     of_sensors = [port for block in (motor_filter, motor_sensors, motor_encoder) for port in block.BLOCK.registers]
-    return {
-        port.name: port for port in (*_OWN, *motor_model.REGISTERS, *motor_bus.REGISTERS, *motor_heat.OWN, *of_sensors)
-    }
+    of_motor = (*motor_model.REGISTERS, *motor_bus.REGISTERS, *motor_heat.OWN)
+    return {port.name: port for port in (*_OWN, *of_motor, *of_sensors)}
 
 
 def motor_registers() -> list[Register]:

@@ -4,8 +4,8 @@
 The bus voltage that stands at a tick holds for the step that begins, also for the sensors; while the motor starts it
 is that of the source.  The charge of the step that
 ends, by the currents that stood at its tick, and the brake resistor at this tick change the voltage of the next one.
-The sensors' filter takes the currents that stand at a tick; its outputs are there FILTERED_AT clocks later.  The temperatures take the same
-currents; hot resistances act from the next step on, the hot magnet flux in this one.
+The sensors' filter takes the currents that stand at a tick; its outputs are there FILTERED_AT clocks later.
+The temperatures take the same currents; hot resistances act from the next step on, the hot magnet flux in this one.
 """
 
 from typing import NamedTuple

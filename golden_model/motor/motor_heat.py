@@ -9,7 +9,8 @@
 The squares of three currents and one further product a step go through one multiplier; step n of a window, of the
 first ten, makes product n (`product`).  The bits of the sum that are not multiplied stay in it for the next window.
 Formats: temperatures S(9,38), S(9,7) where multiplied, S(9,6) outside, in degrees Celsius; h U(-12,36), k U(-10,31),
-tcr U(-7,24), f S(1,16), the sum U(15,32), multiplied U(15,2).  All is cut; temperatures, f, resistances and flux saturate.
+tcr U(-7,24), f S(1,16), the sum U(15,32), multiplied U(15,2).  All is cut; temperatures, f and what is hot
+saturate.
 """
 
 from collections import namedtuple
