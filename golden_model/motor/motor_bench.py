@@ -2,8 +2,8 @@
 """The motor with its bus as they are wired in rtl/motor/motor_bench.vhd, a step of STEP clocks at a time.
 
 The bus voltage that stands at a tick holds for the step that begins, also for the sensors; while the motor starts it
-is that of the source.  The charge of the step that
-ends, by the currents that stood at its tick, and the brake resistor at this tick change the voltage of the next one.
+is that of the source.  The charge of the step that ends, by the currents that stood at its tick, and the brake
+resistor at this tick change the voltage of the next one.
 The sensors' filter takes the currents that stand at a tick; its outputs are there FILTERED_AT clocks later.
 The temperatures take the same currents; hot resistances act from the next step on, the hot magnet flux in this one.
 """

@@ -49,7 +49,7 @@ SPEED_RAD_S, LOAD_NM = 100.0, 0.1
 BUS = Bus(capacitance=470e-6, source_ohm=0.1, diode=True, brake_ohm=5.0)
 FILTER_S = 5e-6  # of the current sensors
 COPPER = replace(SERVO, resistance_temp_coeff_per_k=0.0039, magnet_temp_coeff_per_k=-0.001)
-THERMAL = Thermal(0.2, 0.3, 0.4, 0.6, 60.0)  # so small a winding that some milliseconds warm it
+THERMAL = Thermal(winding_j_per_k=0.5, winding_s=2.0, magnet_s=3.0, ambient_c=60.0)  # nearly the fastest that fits
 PERIODS = 300
 HELD = 200  # periods of a speed
 
