@@ -31,6 +31,7 @@ from fluxproof.hil.registers import (
     motor_tables,
 )
 from fluxproof.plant.bus import Bus
+from fluxproof.plant.pmsm import Machine
 from golden_model import fluxproof
 from golden_model.drive import Drive, load
 from golden_model.motor import motor_bench, motor_bus, motor_heat, motor_model, motor_sensors, motor_shaft
@@ -49,7 +50,7 @@ SPEED_RAD_S, LOAD_NM = 100.0, 0.1
 BUS = Bus(capacitance=470e-6, source_ohm=0.1, diode=True, brake_ohm=5.0)
 FILTER_S = 5e-6  # of the current sensors
 COPPER = replace(SERVO, resistance_temp_coeff_per_k=0.0039, magnet_temp_coeff_per_k=-0.001)
-THERMAL = Thermal(winding_j_per_k=0.5, winding_s=2.0, magnet_s=3.0, ambient_c=60.0)  # nearly the fastest that fits
+THERMAL = Thermal(winding_j_per_k=1.0, winding_s=6.0, magnet_s=8.0, ambient_c=60.0)
 PERIODS = 300
 HELD = 200  # periods of a speed
 
@@ -82,19 +83,19 @@ class Parts(NamedTuple):
         return {f"motor_{name}": value for name, value in own.items()}
 
 
-def parts(drive: Drive | None = None) -> Parts:
-    """The core and the sensors of a drive, by default servo_24v, with the motor of the study."""
+def parts(drive: Drive | None = None, machine: Machine = SERVO, bus: Bus = BUS) -> Parts:
+    """The core and the sensors of a drive, by default servo_24v, with the motor of the study and its bus."""
     drive = drive or load(DRIVES / "servo_24v.toml")
     of_core, sensors = registers(drive), drive.sensors
-    scale = motor_scale(SERVO, drive.inverter.dc_bus_v, sensors.current_range_a, drive.core.clock_hz)
+    scale = motor_scale(machine, drive.inverter.dc_bus_v, sensors.current_range_a, drive.core.clock_hz)
     unit = 1 << motor_sensors.SENSOR_GAIN.frac_bits
-    bus = round(2 * scale.voltage_v / sensors.u_dc_range_v * unit)
-    scales = {"scale_a": unit, "scale_b": unit, "scale_c": unit, "scale_u": bus}
+    bus_unit = round(2 * scale.voltage_v / sensors.u_dc_range_v * unit)
+    scales = {"scale_a": unit, "scale_b": unit, "scale_c": unit, "scale_u": bus_unit}
     still = dict.fromkeys(motor_sensors.Registers._fields, 0) | scales | {"noise_i": 20}
-    motor, tables = motor_registers(scale, SERVO, SWITCHES), motor_tables(scale, SERVO)
-    bus = bus_registers(scale, BUS)
+    motor, tables = motor_registers(scale, machine, SWITCHES), motor_tables(scale, machine)
+    of_bus = bus_registers(scale, bus)
     k_filter, heat = filter_register(scale, FILTER_S), heat_registers(scale, COPPER, THERMAL)
-    return Parts(drive, of_core, scale, motor, tables, motor_sensors.Registers(**still), bus, k_filter, heat)
+    return Parts(drive, of_core, scale, motor, tables, motor_sensors.Registers(**still), of_bus, k_filter, heat)
 
 
 @mixed_kernel
