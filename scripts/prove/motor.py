@@ -73,8 +73,8 @@ BETWEEN = """\
   reg [3:0] n = 0;  // clocks since a sample went in, 0 without one
   wire [3:0] now = in_valid ? 0 : n;
   reg signed [24:0] i_1, i_2, i_3, d_2;
-  reg signed [40:0] y_3;
-  reg added = 0;
+  reg signed [40:0] y_3, rest_3;
+  reg added = 0, turned = 0, cleared = 1;
   wire signed [17:0] i = now == 1 ? i_b : now == 2 ? i_c : i_a;
   wire signed [23:0] old = y_3[40:17], new = seen_y_3[40:17];
   always @(posedge clk) begin
@@ -82,6 +82,9 @@ BETWEEN = """\
     {i_1, i_2, i_3} <= {{i[17], i, 6'b0}, i_1, i_2};
     d_2 <= seen_d_1;
     y_3 <= seen_y_2;
+    rest_3 <= seen_y_3;
+    turned <= now <= 5 && (in_valid || n != 0);
+    cleared <= rst;
     added <= !rst && n >= 2 && n <= 4;
   end
   always @* if (in_valid) assume (n == 0 || n == 7);
@@ -93,6 +96,7 @@ BETWEEN = """\
     assume ($signed(seen_prod_2) >= least && $signed(seen_prod_2) <= most);
   end
 
+  always @(posedge clk) if (begun && !added && !cleared) assert ($signed(seen_y_3) == (turned ? y_3 : rest_3));
   always @(posedge clk) if (begun && added) begin
     assert (old > i_3 || (new >= old && new <= i_3));
     assert (old < i_3 || ($signed(seen_y_3) <= y_3 && new >= i_3));
@@ -179,11 +183,11 @@ PROOFS = (
             Fault("added a turn early", FILTER, "if (or valid(2 to 4)) = '1' then", "if (or valid(1 to 3)) = '1' then"),
             Fault("the difference of another phase", FILTER, "MOTOR_FILTER_LIFT) - y_3(", "MOTOR_FILTER_LIFT) - y_2("),
         ),
-        depth=3,
+        depth=4,
         spies=("valid", "y_1"),
         seen=("prod_2", "d_1", "y_2", "y_3"),
         free=("prod_2",),
         assumed="samples at least 7 clocks apart; any product between 0 and that of the largest k",
-        search_depth=12,
+        search_depth=24,
     ),
 )  # fmt: skip
