@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 
@@ -11,15 +12,27 @@ import pytest
 
 from cocotb_tests.support.needs import skip_without_ghdl5
 from fluxproof.cosim import sleeping
-from fluxproof.hil.registers import PORTS, ROOM, bus_registers, code, machine_of, motor_registers, motor_scale
+from fluxproof.hil.registers import (
+    PORTS,
+    ROOM,
+    Thermal,
+    bus_registers,
+    code,
+    filter_register,
+    heat_registers,
+    machine_of,
+    motor_registers,
+    motor_scale,
+)
 from fluxproof.plant.bus import Bus
 from fluxproof.plant.pmsm import Machine
 from golden_model.common.multiply_add import multiply_subtract
 from golden_model.fixed import round_half_up
 from golden_model.formats import FLUX, MOTOR_FLUX, MOTOR_LEG, MOTOR_VOLTAGE, PU
-from golden_model.motor import motor_bus, motor_flux, motor_legs, motor_model, motor_shaft
+from golden_model.motor import motor_bus, motor_filter, motor_flux, motor_heat, motor_legs, motor_model, motor_shaft
+from golden_model.motor.motor_heat import HEATING, SHARE
 from golden_model.motor.motor_model import Shown
-from studies.hil import closed_loop, commissioning, equal, golden, residual
+from studies.hil import closed_loop, commissioning, equal, golden, in_ghdl, residual
 from studies.hil.beside_plant import HELD, OWN, beside_plant, follow
 from studies.hil.drive import CLOCK_HZ, CURRENT_A, SERVO, SWITCHES, U_DC_V, ride, servo
 from studies.hil.plant import ANGLE_DEG, CURRENT_PERCENT, TORQUE_PERCENT, differences
@@ -36,14 +49,23 @@ def test_motor_in_verilator():
 
 
 @pytest.mark.slow
-def test_core_and_motor_in_one():
+@pytest.mark.parametrize("filter_s", [0.0, closed_loop.FILTER_S])
+def test_core_and_motor_in_one(filter_s):
     """The loop closed in the RTL alone: gates at every clock, the last sample's values, a load step in the middle."""
     skip_without_ghdl5()
-    golden, rtl = closed_loop.compare(40)
+    golden, rtl = closed_loop.compare(40, filter_s)
     wrong = np.flatnonzero(golden.words != rtl.words)
     assert not len(wrong), f"gates differ at clock {wrong[0]}"
     assert rtl.observed[-1] == golden.observed[-1]
     assert golden.observed[-1]["omega_me"] > 1000, "the shaft does not turn"
+
+
+@pytest.mark.slow
+def test_core_and_motor_in_ghdl():
+    """The VHDL as it is, with filter and temperatures on; 300 periods of it: `make hil`."""
+    done = in_ghdl.compare(10)
+    assert not len(done.wrong), f"gates differ at clock {done.wrong[0]}"
+    assert done.speed > 1000 and np.count_nonzero(np.diff(done.found)) > 100
 
 
 @pytest.mark.slow
@@ -66,9 +88,7 @@ def test_compiled_loop_is_the_clocked_one():
     of = of._replace(motor=of.motor._replace(hold=1, omega_set=speed))
     clocked = closed_loop.golden_run(of, periods, 1 << 40).observed
     asked = np.array([[*closed_loop.references(of).values(), 0]] * periods, np.int64)
-    u_dc = of.scale.u_dc(of.drive.inverter.dc_bus_v)
-    hil = golden.Hil(of.core.values, of.core.config, of.motor, of.tables, of.sensors, u_dc, of.bus)
-    _, observed = golden.record(hil, asked, golden.constant(of.motor, periods))
+    _, observed = golden.record(of.hil(), asked, golden.constant(of.motor, periods))
     for k, row in enumerate(clocked):
         assert row == {name: int(values[k]) for name, values in observed.items()}, f"sample {k}"
     assert len(clocked) == periods - 1 and abs(clocked[-1]["omega_me"]) > 1000
@@ -154,6 +174,57 @@ def test_the_bus_is_a_capacitor_with_its_source_and_its_brake_resistor():
     assert after(28.0, 0.0, brake=1) == pytest.approx(28.0 * math.exp(-time_s / (brake_ohm * farad)), rel=1e-3)
     assert after(28.0, 0.0, -2.0) == pytest.approx(28.0 + 2.0 * time_s / farad, rel=1e-3)
     assert after(28.0, 21.0, 5.0, inv_c=0) == pytest.approx(21.0, rel=1e-6), "without a capacitor it is the source"
+
+
+def test_the_filter_is_of_first_order_and_rests_at_the_current():
+    """A step of the currents against an exponential; then rest to the last bit; no filter follows at once."""
+    scale, seconds = motor_scale(SERVO, U_DC_V, CURRENT_A, CLOCK_HZ), 5e-6
+    k, steps, i = filter_register(scale, seconds), round(5e-6 / scale.step_s), (50_000, -30_000, 12_345)
+    state, y = motor_filter.State(), ()
+    for _ in range(steps):
+        state, y = motor_filter.step(state, *i, k)
+    share = 1.0 - (1.0 - k * motor_filter.SHARE.lsb) ** steps
+    assert share == pytest.approx(1.0 - math.exp(-steps * scale.step_s / seconds), rel=1e-3)
+    assert y == pytest.approx([share * x for x in i], abs=1)
+    for _ in range(40 * steps):
+        state, y = motor_filter.step(state, *i, k)
+    assert y == i
+    state, y = motor_filter.step(motor_filter.State(), *i, 0)
+    assert filter_register(scale, 0.0) == 0 and y == pytest.approx(i, abs=1)
+    with pytest.raises(ValueError, match=r"k_filter: 1 s is beyond 0\.0111 s"):
+        filter_register(scale, 1.0)
+
+
+def test_winding_and_magnets_warm_and_r_and_psi_follow():
+    """Against closed forms: the rise of a first-order body by its losses, the magnets behind it, what is then hot."""
+    copper = dataclasses.replace(SERVO, resistance_temp_coeff_per_k=0.0039, magnet_temp_coeff_per_k=-0.001)
+    scale, body = motor_scale(SERVO, U_DC_V, CURRENT_A, CLOCK_HZ), Thermal(0.05, 0.2, 0.3, ambient_c=25.0)
+    own, i, bits = heat_registers(scale, copper, body), 85_000, 4
+    squares = 3 * (i * PU.lsb) ** 2
+    h, k_w, k_m = own.heating * HEATING.lsb, own.k_winding * SHARE.lsb, own.k_magnet * SHARE.lsb
+    rise = h * 2**motor_heat.WINDOW_BITS * squares / k_w
+    watts = 3 * SERVO.resistance_ohm * (i * PU.lsb * CURRENT_A) ** 2
+    assert rise == pytest.approx(watts / body.winding_j_per_k * body.winding_s, rel=1e-3)
+
+    # A window of 16 steps: as slow a body takes a 128th of the losses; R does not add to them
+    rise, windows, r, psi = rise / 2 ** (motor_heat.WINDOW_BITS - bits), 600, (1 << 20, 2 << 20, 3 << 20), 6_000_000
+    regs = motor_heat.Registers(*r, psi, **own._asdict())._replace(tcr_winding=0)
+    state, out = motor_heat.step(motor_heat.State(), motor_heat.Inputs(0, 0, 0, 1), regs, bits)
+    assert out[4] == out[5] == 25 << 6
+    winding = magnet = 25.0
+    for _ in range(windows):
+        for _ in range(1 << bits):
+            state, out = motor_heat.step(state, motor_heat.Inputs(i, i, i, 0), regs, bits)
+        magnet += k_m * (winding - magnet)
+        winding = 25.0 + rise - (25.0 + rise - winding) * (1.0 - k_w)
+    assert winding > 30.0 and magnet > 26.0
+    assert out[4] / 64 == pytest.approx(winding, abs=0.05) and out[5] / 64 == pytest.approx(magnet, abs=0.05)
+    assert out[:3] == r, "without a coefficient R stays to the last bit"
+    assert out[3] == pytest.approx(psi * (1 - 0.001 * (magnet - 20.0)), rel=1e-4)
+    regs = regs._replace(heating=0, tcr_winding=own.tcr_winding, k_winding=0)
+    for _ in range(2 << bits):
+        state, out = motor_heat.step(state, motor_heat.Inputs(0, 0, 0, 0), regs, bits)
+    assert out[:3] == pytest.approx([x * (1 + 0.0039 * (winding - 20.0)) for x in r], rel=1e-4)
 
 
 def test_a_rounded_loss_is_a_loss():

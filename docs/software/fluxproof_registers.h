@@ -1900,6 +1900,12 @@ extern "C" {
 #define FLUXPROOF__MOTOR_HALL_OFFSET__VALUE_bw 25
 #define FLUXPROOF__MOTOR_HALL_OFFSET__VALUE_reset 0x0
 
+// reg - fluxproof::motor_k_filter
+#define FLUXPROOF__MOTOR_K_FILTER__VALUE_bm 0x1ffff
+#define FLUXPROOF__MOTOR_K_FILTER__VALUE_bp 0
+#define FLUXPROOF__MOTOR_K_FILTER__VALUE_bw 17
+#define FLUXPROOF__MOTOR_K_FILTER__VALUE_reset 0x0
+
 // reg - fluxproof::motor_table_select
 #define FLUXPROOF__MOTOR_TABLE_SELECT__VALUE_bm 0x3
 #define FLUXPROOF__MOTOR_TABLE_SELECT__VALUE_bp 0
@@ -1929,6 +1935,48 @@ extern "C" {
 #define FLUXPROOF__MOTOR_TABLE_WRITE__VALUE_bp 0
 #define FLUXPROOF__MOTOR_TABLE_WRITE__VALUE_bw 1
 #define FLUXPROOF__MOTOR_TABLE_WRITE__VALUE_reset 0x0
+
+// reg - fluxproof::motor_ambient
+#define FLUXPROOF__MOTOR_AMBIENT__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_AMBIENT__VALUE_bp 0
+#define FLUXPROOF__MOTOR_AMBIENT__VALUE_bw 32
+#define FLUXPROOF__MOTOR_AMBIENT__VALUE_reset 0x0
+
+// reg - fluxproof::motor_t_ref
+#define FLUXPROOF__MOTOR_T_REF__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_T_REF__VALUE_bp 0
+#define FLUXPROOF__MOTOR_T_REF__VALUE_bw 32
+#define FLUXPROOF__MOTOR_T_REF__VALUE_reset 0x0
+
+// reg - fluxproof::motor_heating
+#define FLUXPROOF__MOTOR_HEATING__VALUE_bm 0xffffff
+#define FLUXPROOF__MOTOR_HEATING__VALUE_bp 0
+#define FLUXPROOF__MOTOR_HEATING__VALUE_bw 24
+#define FLUXPROOF__MOTOR_HEATING__VALUE_reset 0x0
+
+// reg - fluxproof::motor_k_winding
+#define FLUXPROOF__MOTOR_K_WINDING__VALUE_bm 0x1fffff
+#define FLUXPROOF__MOTOR_K_WINDING__VALUE_bp 0
+#define FLUXPROOF__MOTOR_K_WINDING__VALUE_bw 21
+#define FLUXPROOF__MOTOR_K_WINDING__VALUE_reset 0x0
+
+// reg - fluxproof::motor_k_magnet
+#define FLUXPROOF__MOTOR_K_MAGNET__VALUE_bm 0x1fffff
+#define FLUXPROOF__MOTOR_K_MAGNET__VALUE_bp 0
+#define FLUXPROOF__MOTOR_K_MAGNET__VALUE_bw 21
+#define FLUXPROOF__MOTOR_K_MAGNET__VALUE_reset 0x0
+
+// reg - fluxproof::motor_tcr_winding
+#define FLUXPROOF__MOTOR_TCR_WINDING__VALUE_bm 0x1ffff
+#define FLUXPROOF__MOTOR_TCR_WINDING__VALUE_bp 0
+#define FLUXPROOF__MOTOR_TCR_WINDING__VALUE_bw 17
+#define FLUXPROOF__MOTOR_TCR_WINDING__VALUE_reset 0x0
+
+// reg - fluxproof::motor_tcr_magnet
+#define FLUXPROOF__MOTOR_TCR_MAGNET__VALUE_bm 0x1ffff
+#define FLUXPROOF__MOTOR_TCR_MAGNET__VALUE_bp 0
+#define FLUXPROOF__MOTOR_TCR_MAGNET__VALUE_bw 17
+#define FLUXPROOF__MOTOR_TCR_MAGNET__VALUE_reset 0x0
 
 // reg - fluxproof::motor_i_a
 #define FLUXPROOF__MOTOR_I_A__VALUE_bm 0xffffffff
@@ -1979,6 +2027,16 @@ extern "C" {
 #define FLUXPROOF__MOTOR_U_BUS__VALUE_bm 0xffffffff
 #define FLUXPROOF__MOTOR_U_BUS__VALUE_bp 0
 #define FLUXPROOF__MOTOR_U_BUS__VALUE_bw 32
+
+// reg - fluxproof::motor_temp_winding
+#define FLUXPROOF__MOTOR_TEMP_WINDING__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_TEMP_WINDING__VALUE_bp 0
+#define FLUXPROOF__MOTOR_TEMP_WINDING__VALUE_bw 32
+
+// reg - fluxproof::motor_temp_magnet
+#define FLUXPROOF__MOTOR_TEMP_MAGNET__VALUE_bm 0xffffffff
+#define FLUXPROOF__MOTOR_TEMP_MAGNET__VALUE_bp 0
+#define FLUXPROOF__MOTOR_TEMP_MAGNET__VALUE_bw 32
 
 // addrmap - fluxproof
 typedef struct {
@@ -2320,13 +2378,22 @@ typedef struct {
     uint32_t motor_angle_offset;
     uint32_t motor_counts;
     uint32_t motor_hall_offset;
-    uint8_t RESERVED_8b4_8bf[0xc];
+    uint32_t motor_k_filter;
+    uint8_t RESERVED_8b8_8bf[0x8];
     uint32_t motor_table_select;
     uint32_t motor_table_at;
     uint32_t motor_table_high;
     uint32_t motor_table_low;
     uint32_t motor_table_write;
-    uint8_t RESERVED_8d4_8ff[0x2c];
+    uint8_t RESERVED_8d4_8df[0xc];
+    uint32_t motor_ambient;
+    uint32_t motor_t_ref;
+    uint32_t motor_heating;
+    uint32_t motor_k_winding;
+    uint32_t motor_k_magnet;
+    uint32_t motor_tcr_winding;
+    uint32_t motor_tcr_magnet;
+    uint8_t RESERVED_8fc_8ff[0x4];
     uint32_t motor_i_a;
     uint32_t motor_i_b;
     uint32_t motor_i_c;
@@ -2337,11 +2404,13 @@ typedef struct {
     uint32_t motor_shoot_through;
     uint32_t motor_ready;
     uint32_t motor_u_bus;
+    uint32_t motor_temp_winding;
+    uint32_t motor_temp_magnet;
 } fluxproof_t;
 
 
 #if defined(__cplusplus) || __STDC_VERSION__ >= 201112L
-static_assert(sizeof(fluxproof_t) == 0x928, "Packing error");
+static_assert(sizeof(fluxproof_t) == 0x930, "Packing error");
 #endif
 
 #ifdef __cplusplus

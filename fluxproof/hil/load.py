@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fluxproof.hil.registers import bus_registers, code, motor_registers, motor_scale, motor_tables
+from fluxproof.hil.registers import bus_registers, code, heat_registers, motor_registers, motor_scale, motor_tables
 from fluxproof.plant import Bus, Inverter, Machine, Sensors
 from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError
@@ -36,7 +36,7 @@ def load_words(drive: Drive, machine: Machine, inverter: Inverter, sensors: Sens
     try:
         scale = motor_scale(machine, drive.inverter.dc_bus_v, drive.sensors.current_range_a, drive.core.clock_hz)
         values = motor_registers(scale, machine, inverter)._asdict() | {"u_dc": scale.u_dc(drive.inverter.dc_bus_v)}
-        values |= bus_registers(scale, bus)._asdict()
+        values |= bus_registers(scale, bus)._asdict() | heat_registers(scale, machine)._asdict()
         values |= sensor_registers(drive, sensors, scale.current_a, scale.voltage_v)
         tables = motor_tables(scale, machine)
     except ValueError as error:
@@ -85,6 +85,7 @@ def sensor_registers(drive: Drive, sensors: Sensors, current_a: float, voltage_v
         "angle_offset": round(turns / MOTOR_ANGLE.lsb) % (1 << MOTOR_ANGLE.width),
         "counts": counts or 0,
         "hall_offset": 0,
+        "k_filter": 0,  # no key of a drive file describes it
     }
 
 

@@ -4,6 +4,8 @@
 scale = motor_scale(machine, u_dc_v, current_a, clock_hz)
 registers, tables = motor_registers(scale, machine, inverter), motor_tables(scale, machine)
 bus_registers(scale, bus)                            of the bus; the source's voltage is scale.u_dc(volts)
+filter_register(scale, time_constant_s)              of the filter of the current sensors
+heat_registers(scale, machine, thermal)              of the temperatures
 machine_of(scale, registers, machine, inverter)      what the rounded registers say, in SI units
 """
 
@@ -19,7 +21,7 @@ from fluxproof.plant.inverter import Inverter
 from fluxproof.plant.pmsm import SATURATED, Machine, currents_from_flux, harmonic_flux, machine_params
 from golden_model.fixed import Format
 from golden_model.formats import FLUX, MOTOR_SPEED, MOTOR_VOLTAGE, MOTOR_WAVE
-from golden_model.motor import motor_bus, motor_model
+from golden_model.motor import motor_bus, motor_filter, motor_heat, motor_model
 from golden_model.motor.motor_angle import POINTS
 from golden_model.motor.motor_current import POINT
 from golden_model.motor.motor_flux import CLOCKS_BITS
@@ -58,6 +60,17 @@ class Scale:
     def speed_rad_s(self, omega_m):
         """Mechanical speed of a code."""
         return omega_m * MOTOR_SPEED.lsb * 2 * math.pi / self.step_s
+
+
+@dataclass(frozen=True)
+class Thermal:
+    """Bodies of the winding and, behind it, of the magnets: first order each."""
+
+    winding_j_per_k: float
+    winding_s: float  # time constant to the ambient
+    magnet_s: float  # time constant to the winding
+    share: float = 1.0  # of the copper loss that warms the winding
+    ambient_c: float = 20.0
 
 
 def code(name: str, value: float, fmt: Format) -> int:
@@ -122,6 +135,38 @@ def bus_registers(scale: Scale, bus: Bus) -> motor_bus.Registers:
         k_brake=code("k_brake", share / bus.brake_ohm, ports["k_brake"]),
         rectifier=int(bus.diode),
     )
+
+
+def filter_register(scale: Scale, time_constant_s: float) -> int:
+    """Register of the current sensors' filter; 0: none.  ValueError for a time constant that rounds to none."""
+    if time_constant_s == 0.0:
+        return 0
+    share = code("k_filter", -math.expm1(-scale.step_s / time_constant_s), motor_filter.SHARE)
+    if share == 0:
+        raise ValueError(f"motor: k_filter: {time_constant_s:.6g} s is beyond {scale.step_s * motor_filter.MOST:.3g} s")
+    return share
+
+
+def heat_registers(scale: Scale, machine: Machine, thermal: Thermal | None = None) -> motor_heat.Own:
+    """Registers of the temperatures; ValueError where a value does not fit.
+
+    Without thermal bodies nothing depends on a temperature.
+    """
+    ports = {p.name: p.fmt for p in motor_heat.OWN}
+    window_s = scale.step_s * 2.0**motor_heat.WINDOW_BITS
+    values = dict.fromkeys(motor_heat.Own._fields, 0.0)
+    if thermal is not None:
+        watts = thermal.share * machine.resistance_ohm * scale.current_a**2  # per square of a phase current
+        values |= {
+            "ambient": thermal.ambient_c,
+            "t_ref": machine.temperature_ref_c,
+            "heating": watts * scale.step_s / thermal.winding_j_per_k,
+            "k_winding": window_s / thermal.winding_s,
+            "k_magnet": window_s / thermal.magnet_s,
+            "tcr_winding": machine.resistance_temp_coeff_per_k,
+            "tcr_magnet": -machine.magnet_temp_coeff_per_k,
+        }
+    return motor_heat.Own(**{name: code(name, value, ports[name]) for name, value in values.items()})
 
 
 def motor_tables(scale: Scale, machine: Machine) -> Tables:

@@ -15,7 +15,7 @@ from golden_model.fixed import Format
 from golden_model.formats import BIT, FLUX, MOTOR_ANGLE, MOTOR_SPEED, MOTOR_VOLTAGE, PU
 from golden_model.io import board_map, register_map
 from golden_model.io.register_map import Field, Kind, Register
-from golden_model.motor import motor_bus, motor_encoder, motor_model, motor_sensors
+from golden_model.motor import motor_bus, motor_encoder, motor_filter, motor_heat, motor_model, motor_sensors
 
 BASE, END = 0x800, 0xA00
 PREFIX = "motor_"
@@ -30,12 +30,15 @@ _COMMANDS = """
     880 scale_a          884 scale_b         888 scale_c         88c scale_u
     890 zero_a           894 zero_b          898 zero_c          89c zero_u
     8a0 noise_i          8a4 noise_u         8a8 angle_offset    8ac counts         8b0 hall_offset
+    8b4 k_filter
+    8e0 ambient          8e4 t_ref           8e8 heating         8ec k_winding      8f0 k_magnet
+    8f4 tcr_winding      8f8 tcr_magnet
     8c0 table_select     8c4 table_at        8c8 table_high      8cc table_low
 """
 _PULSES = "814 clear_faults  8d0 table_write"
 _STATUS = """
     900 i_a  904 i_b  908 i_c  90c torque  910 omega_m  914 theta_m  918 theta_e  91c shoot_through  920 ready
-    924 u_bus
+    924 u_bus  928 temp_winding  92c temp_magnet
 """
 COMMANDS, PULSES, STATUS = (register_map._table(text) for text in (_COMMANDS, _PULSES, _STATUS))
 _OWN = (  # inputs of the motor that are no registers of a block
@@ -58,13 +61,16 @@ _SHOWN = (
     Port("shoot_through", BIT, doc="1: both gates of a leg were on"),
     Port("ready", BIT, doc="1: the rotor is free"),
     Port("u_bus", MOTOR_VOLTAGE, doc="voltage of the bus"),
+    *(p for p in motor_heat.BLOCK.outputs if p.name.startswith("temp_")),
 )
 
 _UNITS = {  # what 1.0 is: the bases of fluxproof/hil/registers.py
     "U_motor": "u_dc u_bus v_switch v_diode", "I_motor": "i_a i_b i_c zero_a zero_b zero_c",
     "psi_motor": "psi_start psi_m",
     "T_motor": "load coulomb torque", "U_motor/I_motor": "r_a r_b r_c stiffness",
-    "I_motor/psi_motor": "inv_l_d inv_l_q", "U_motor/(I_motor clock)": "inv_c", "1/step": "k_source k_brake",
+    "I_motor/psi_motor": "inv_l_d inv_l_q", "U_motor/(I_motor clock)": "inv_c",
+    "1/step": "k_source k_brake k_filter", "1/window": "k_winding k_magnet", "1/K": "tcr_winding tcr_magnet",
+    "degC": "ambient t_ref temp_winding temp_magnet", "degC/(I_motor^2 window)": "heating",
     "turn": "angle_offset hall_offset theta_m theta_e", "turn/step": "omega_set omega_m", "turn/step^2/T_motor": "k_j",
     "T_motor step/turn": "viscous",
 }  # fmt: skip
@@ -73,8 +79,9 @@ UNITS = {PREFIX + name: unit for unit, names in _UNITS.items() for name in names
 
 def settings() -> dict[str, Port]:
     """The ports of the registers that software writes, without the prefix."""
-    of_sensors = (*motor_sensors.BLOCK.registers, *motor_encoder.BLOCK.registers)
-    return {port.name: port for port in (*_OWN, *motor_model.REGISTERS, *motor_bus.REGISTERS, *of_sensors)}
+    of_sensors = [port for block in (motor_filter, motor_sensors, motor_encoder) for port in block.BLOCK.registers]
+    of_motor = (*motor_model.REGISTERS, *motor_bus.REGISTERS, *motor_heat.OWN)
+    return {port.name: port for port in (*_OWN, *of_motor, *of_sensors)}
 
 
 def motor_registers() -> list[Register]:

@@ -2,17 +2,22 @@
 """The motor with its bus as they are wired in rtl/motor/motor_bench.vhd, a step of STEP clocks at a time.
 
 The bus voltage that stands at a tick holds for the step that begins, also for the sensors; while the motor starts it
-is that of the source.  The charge of the step that
-ends, by the currents that stood at its tick, and the brake resistor at this tick change the voltage of the next one.
+is that of the source.  The charge of the step that ends, by the currents that stood at its tick, and the brake
+resistor at this tick change the voltage of the next one.
+The sensors' filter takes the currents that stand at a tick; its outputs are there FILTERED_AT clocks later.
+The temperatures take the same currents; hot resistances act from the next step on, the hot magnet flux in this one.
 """
 
 from typing import NamedTuple
 
 from golden_model.kernel import kernel
-from golden_model.motor import motor_bus, motor_charge, motor_model
+from golden_model.motor import motor_bus, motor_charge, motor_filter, motor_heat, motor_model
 
 bus_step, of_step, motor_step = motor_bus.step, motor_charge.of_step, motor_model.step
-Inputs, DROP_U = motor_model.Inputs, motor_bus.DROP_U
+filter_step, heat_step, hot_of, WINDOW_BITS = motor_filter.step, motor_heat.step, motor_heat.hot, motor_heat.WINDOW_BITS
+MotorRegisters, HeatInputs, HeatRegisters = motor_model.Registers, motor_heat.Inputs, motor_heat.Registers
+Inputs, DROP_U, STEP = motor_model.Inputs, motor_bus.DROP_U, motor_model.STEP
+FILTERED_AT = 2 + motor_filter.BLOCK.latency
 
 
 class State(NamedTuple):
@@ -20,10 +25,14 @@ class State(NamedTuple):
     bus: motor_bus.State = motor_bus.State()
     u_dc: int = 0  # since the last tick
     u_dc_1: int = 0  # in the step before
+    filter: motor_filter.State = motor_filter.State()
+    filtered: tuple = (0,) * 3  # phases a, b, c
+    filtered_1: tuple = (0,) * 3  # of the step before
+    heat: motor_heat.State = motor_heat.State()
 
 
 @kernel
-def step(state, inputs, brake, regs, of_bus, tables, clocks):
+def step(state, inputs, brake, regs, of_bus, k_filter, of_heat, tables, clocks):
     """One step: (state, what stands at the motor's outputs at its tick); ``inputs.u_dc`` is that of the source."""
     x, before = inputs, state.motor.chain_4
     start = 1 if x.start or state.motor.starting > 0 else 0
@@ -37,5 +46,26 @@ def step(state, inputs, brake, regs, of_bus, tables, clocks):
         state.bus, charge, x.u_dc, brake, start, of_bus.inv_c, of_bus.k_source, of_bus.k_brake, of_bus.rectifier
     )
     now = Inputs(u_dc, x.load, x.start, x.high_a, x.low_a, x.high_b, x.low_b, x.high_c, x.low_c)
-    motor, shown = motor_step(state.motor, now, regs, tables, clocks)
-    return State(motor, bus, u_dc, state.u_dc), shown
+    r, h, seen = regs, of_heat, state.motor.chain_3
+    cold = HeatRegisters(
+        r.r_a, r.r_b, r.r_c, r.psi_m, h.ambient, h.t_ref, h.heating, h.k_winding, h.k_magnet, h.tcr_winding,
+        h.tcr_magnet,
+    )  # fmt: skip
+    r_a, r_b, r_c, _ = hot_of(state.heat, cold)
+    heat, _ = heat_step(state.heat, HeatInputs(seen.i_a, seen.i_b, seen.i_c, start), cold, WINDOW_BITS)
+    _, _, _, psi_m = hot_of(heat, cold)
+    warm = MotorRegisters(
+        r.stiffness, r.v_switch, r.v_diode, r_a, r_b, r_c, r.psi_start, psi_m, r.inv_l_d, r.inv_l_q, r.k_j,
+        r.viscous, r.coulomb, r.pole_pairs, r.hold, r.omega_set,
+    )  # fmt: skip
+    motor, shown = motor_step(state.motor, now, warm, tables, clocks)
+    of_filter, filtered = filter_step(state.filter, shown.i_a, shown.i_b, shown.i_c, k_filter)
+    return State(motor, bus, u_dc, state.u_dc, of_filter, filtered, state.filtered, heat), shown
+
+
+@kernel
+def converted(state, chain, clock, k_filter):
+    """The currents that the converters see at a clock; ``chain``: what stands at the motor's outputs."""
+    if k_filter == 0:
+        return chain.i_a, chain.i_b, chain.i_c
+    return state.filtered if clock % STEP >= FILTERED_AT else state.filtered_1

@@ -33,7 +33,8 @@ entity fluxproof_hil is
     TRIP_FILTER   : integer range 0 to 1023      := 0;  -- longest pulse of trip without effect, clocks; 0: every pulse acts
     ENCODER       : integer range 0 to 3         := 0;  -- the kind of encoder, see above
     CURRENTS      : integer range 0 to 0         := 0;  -- codes
-    SPI_LINES     : integer range 1 to 1         := 1  -- none is used
+    SPI_LINES     : integer range 1 to 1         := 1;  -- none is used
+    TEMPERATURES  : integer range 0 to 1         := 1  -- 0 leaves the temperatures out: hot is as cold
   );
   port (
     aclk           : in  std_logic;  -- the one clock
@@ -193,11 +194,19 @@ architecture rtl of fluxproof_hil is
   signal motor_angle_offset  : unsigned(24 downto 0);
   signal motor_counts        : unsigned(15 downto 0);
   signal motor_hall_offset   : unsigned(24 downto 0);
+  signal motor_k_filter      : unsigned(16 downto 0);
   signal motor_table_select  : unsigned(1 downto 0);
   signal motor_table_at      : unsigned(11 downto 0);
   signal motor_table_high    : unsigned(17 downto 0);
   signal motor_table_low     : unsigned(17 downto 0);
   signal motor_table_write   : std_logic;
+  signal motor_ambient       : signed(15 downto 0);
+  signal motor_t_ref         : signed(15 downto 0);
+  signal motor_heating       : unsigned(23 downto 0);
+  signal motor_k_winding     : unsigned(20 downto 0);
+  signal motor_k_magnet      : unsigned(20 downto 0);
+  signal motor_tcr_winding   : unsigned(16 downto 0);
+  signal motor_tcr_magnet    : unsigned(16 downto 0);
   signal gate_high_next      : unsigned(2 downto 0);
   signal gate_low_next       : unsigned(2 downto 0);
   signal trigger_next        : std_logic;
@@ -287,6 +296,8 @@ architecture rtl of fluxproof_hil is
   signal motor_theta_m       : unsigned(MOTOR_ANGLE_W - 1 downto 0);
   signal motor_theta_e       : unsigned(MOTOR_ANGLE_W - 1 downto 0);
   signal motor_u_bus         : signed(MOTOR_VOLTAGE_W - 1 downto 0);
+  signal motor_temp_winding  : signed(15 downto 0);
+  signal motor_temp_magnet   : signed(15 downto 0);
   signal motor_shoot_through : std_logic;
   signal sample              : sample_t;
   signal core_settings       : settings_t;
@@ -510,11 +521,19 @@ begin
       motor_angle_offset  => motor_angle_offset,
       motor_counts        => motor_counts,
       motor_hall_offset   => motor_hall_offset,
+      motor_k_filter      => motor_k_filter,
       motor_table_select  => motor_table_select,
       motor_table_at      => motor_table_at,
       motor_table_high    => motor_table_high,
       motor_table_low     => motor_table_low,
       motor_table_write   => motor_table_write,
+      motor_ambient       => motor_ambient,
+      motor_t_ref         => motor_t_ref,
+      motor_heating       => motor_heating,
+      motor_k_winding     => motor_k_winding,
+      motor_k_magnet      => motor_k_magnet,
+      motor_tcr_winding   => motor_tcr_winding,
+      motor_tcr_magnet    => motor_tcr_magnet,
       running             => running,
       tripped             => tripped,
       setting_refused     => setting_refused,
@@ -561,7 +580,9 @@ begin
       motor_theta_e       => motor_theta_e,
       motor_shoot_through => motor_shoot_through,
       motor_ready         => motor_ready,
-      motor_u_bus         => motor_u_bus
+      motor_u_bus         => motor_u_bus,
+      motor_temp_winding  => motor_temp_winding,
+      motor_temp_magnet   => motor_temp_magnet
     );
 
   core : entity work.fluxproof
@@ -910,7 +931,8 @@ begin
   load_machine : entity work.motor_bench
     generic map (
       ADC_BITS      => ADC_BITS,
-      POSITION_BITS => POSITION_BITS
+      POSITION_BITS => POSITION_BITS,
+      TEMPERATURES  => TEMPERATURES
     )
     port map (
       clk                 => aclk,
@@ -956,6 +978,14 @@ begin
       motor_zero_b        => motor_zero_b,
       motor_zero_c        => motor_zero_c,
       motor_zero_u        => motor_zero_u,
+      motor_k_filter      => motor_k_filter,
+      motor_ambient       => motor_ambient,
+      motor_t_ref         => motor_t_ref,
+      motor_heating       => motor_heating,
+      motor_k_winding     => motor_k_winding,
+      motor_k_magnet      => motor_k_magnet,
+      motor_tcr_winding   => motor_tcr_winding,
+      motor_tcr_magnet    => motor_tcr_magnet,
       motor_noise_i       => motor_noise_i,
       motor_noise_u       => motor_noise_u,
       motor_angle_offset  => motor_angle_offset,
@@ -983,6 +1013,8 @@ begin
       motor_theta_m       => motor_theta_m,
       motor_theta_e       => motor_theta_e,
       motor_u_bus         => motor_u_bus,
+      motor_temp_winding  => motor_temp_winding,
+      motor_temp_magnet   => motor_temp_magnet,
       motor_shoot_through => motor_shoot_through
     );
 

@@ -1462,6 +1462,12 @@ package fluxproof_pkg is
   -- motor_encoder: docs/hil.md: sensors
   constant MOTOR_ENCODER_LATENCY : positive := 3;
 
+  -- motor_filter: docs/hil.md: sensors
+  constant MOTOR_FILTER_LATENCY : positive := 7;
+  constant MOTOR_FILTER_DROP_SEEN : natural := 17;
+  constant MOTOR_FILTER_DROP_OUT : natural := 23;
+  constant MOTOR_FILTER_LIFT : natural := 6;
+
   -- motor_flux: docs/hil.md: d lambda/dt = u - R i
   constant MOTOR_FLUX_LATENCY : positive := 9;
   constant MOTOR_FLUX_DROP_RI : natural := 15;
@@ -1469,6 +1475,16 @@ package fluxproof_pkg is
   constant MOTOR_FLUX_DROP_BETA : natural := 11;
   constant MOTOR_FLUX_DROP_OUT : natural := 15;
   constant MOTOR_FLUX_SQRT3 : signed(17 downto 0) := to_signed(113512, 18);  -- 1.732050808 as S(1,16), signed for the multiplier
+
+  -- motor_heat: docs/hil.md: temperatures
+  constant MOTOR_HEAT_LATENCY : positive := 6;
+  constant MOTOR_HEAT_DROP_SEEN : natural := 31;
+  constant MOTOR_HEAT_DROP_OUT : natural := 32;
+  constant MOTOR_HEAT_DROP_SUM : natural := 30;
+  constant MOTOR_HEAT_DROP_F : natural := 15;
+  constant MOTOR_HEAT_DROP_HOT : natural := 16;
+  constant MOTOR_HEAT_WINDOW_BITS : natural := 11;
+  constant MOTOR_HEAT_PRODUCTS : natural := 10;
 
   -- motor_inverter: docs/hil.md: legs of the inverter
   constant MOTOR_INVERTER_LATENCY : positive := 1;

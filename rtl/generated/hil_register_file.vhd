@@ -177,11 +177,19 @@ entity hil_register_file is
     motor_angle_offset  : out unsigned(24 downto 0);  -- 8a8 angle of the encoder at the motor's zero
     motor_counts        : out unsigned(15 downto 0);  -- 8ac counts of the encoder in a turn
     motor_hall_offset   : out unsigned(24 downto 0);  -- 8b0 electrical angle at which the first sector begins
+    motor_k_filter      : out unsigned(16 downto 0);  -- 8b4 share of a step in the filter of the current sensors; 0: no filter
     motor_table_select  : out unsigned(1 downto 0);  -- 8c0 0 map, 1 harmonic fluxes, 2 cogging
     motor_table_at      : out unsigned(11 downto 0);  -- 8c4 address of the word: row and column of the map, or share of the turn
     motor_table_high    : out unsigned(17 downto 0);  -- 8c8 the word's d axis
     motor_table_low     : out unsigned(17 downto 0);  -- 8cc the word's q axis, or its torque
     motor_table_write   : out std_logic;  -- 8d0 1: write the word
+    motor_ambient       : out signed(15 downto 0);  -- 8e0 ambient temperature, and that of winding and magnets at the start
+    motor_t_ref         : out signed(15 downto 0);  -- 8e4 temperature at which motor_r_a to motor_r_c and motor_psi_m hold
+    motor_heating       : out unsigned(23 downto 0);  -- 8e8 warming of the winding per square of the currents, at t_ref
+    motor_k_winding     : out unsigned(20 downto 0);  -- 8ec share of the difference to the ambient that the winding loses in a window
+    motor_k_magnet      : out unsigned(20 downto 0);  -- 8f0 share of the difference to the winding that the magnets follow in a window
+    motor_tcr_winding   : out unsigned(16 downto 0);  -- 8f4 what the resistances gain per degree, relative; 0: no temperature
+    motor_tcr_magnet    : out unsigned(16 downto 0);  -- 8f8 what the magnet flux loses per degree, relative; 0: no temperature
     running             : in  std_logic;  -- 080 gates are switching
     tripped             : in  std_logic;  -- 080 1: a trip is latched
     setting_refused     : in  std_logic;  -- 080 1: dead_time and min_pulse contradict each other, refused
@@ -228,7 +236,9 @@ entity hil_register_file is
     motor_theta_e       : in  unsigned(24 downto 0);  -- 918 electrical angle
     motor_shoot_through : in  std_logic;  -- 91c 1: both gates of a leg were on
     motor_ready         : in  std_logic;  -- 920 1: the rotor is free
-    motor_u_bus         : in  signed(23 downto 0)  -- 924 voltage of the bus
+    motor_u_bus         : in  signed(23 downto 0);  -- 924 voltage of the bus
+    motor_temp_winding  : in  signed(15 downto 0);  -- 928 temperature of the winding
+    motor_temp_magnet   : in  signed(15 downto 0)  -- 92c temperature of the magnets
   );
 end entity hil_register_file;
 
@@ -1329,6 +1339,10 @@ begin
         motor_hall_offset <= unsigned(held(24 downto 0));
         written(556)      <= '1';
       end if;
+      if (row(69) and column(5)) = '1' then
+        motor_k_filter <= unsigned(held(16 downto 0));
+        written(557)   <= '1';
+      end if;
       if (row(70) and column(0)) = '1' then
         motor_table_select <= unsigned(held(1 downto 0));
         written(560)       <= '1';
@@ -1347,6 +1361,34 @@ begin
       end if;
       if (row(70) and column(4)) = '1' then
         motor_table_write <= held(0);
+      end if;
+      if (row(71) and column(0)) = '1' then
+        motor_ambient <= signed(held(15 downto 0));
+        written(568)  <= '1';
+      end if;
+      if (row(71) and column(1)) = '1' then
+        motor_t_ref  <= signed(held(15 downto 0));
+        written(569) <= '1';
+      end if;
+      if (row(71) and column(2)) = '1' then
+        motor_heating <= unsigned(held(23 downto 0));
+        written(570)  <= '1';
+      end if;
+      if (row(71) and column(3)) = '1' then
+        motor_k_winding <= unsigned(held(20 downto 0));
+        written(571)    <= '1';
+      end if;
+      if (row(71) and column(4)) = '1' then
+        motor_k_magnet <= unsigned(held(20 downto 0));
+        written(572)   <= '1';
+      end if;
+      if (row(71) and column(5)) = '1' then
+        motor_tcr_winding <= unsigned(held(16 downto 0));
+        written(573)      <= '1';
+      end if;
+      if (row(71) and column(6)) = '1' then
+        motor_tcr_magnet <= unsigned(held(16 downto 0));
+        written(574)     <= '1';
       end if;
 
       if rst = '1' then
@@ -1594,11 +1636,19 @@ begin
         motor_angle_offset        <= (others => '0');
         motor_counts              <= (others => '0');
         motor_hall_offset         <= (others => '0');
+        motor_k_filter            <= (others => '0');
         motor_table_select        <= (others => '0');
         motor_table_at            <= (others => '0');
         motor_table_high          <= (others => '0');
         motor_table_low           <= (others => '0');
         motor_table_write         <= '0';
+        motor_ambient             <= (others => '0');
+        motor_t_ref               <= (others => '0');
+        motor_heating             <= (others => '0');
+        motor_k_winding           <= (others => '0');
+        motor_k_magnet            <= (others => '0');
+        motor_tcr_winding         <= (others => '0');
+        motor_tcr_magnet          <= (others => '0');
       end if;
     end if;
   end process;
@@ -1865,6 +1915,8 @@ begin
   shown(583)         <= "0000000000000000000000000000000" & motor_shoot_through;
   shown(584)         <= "0000000000000000000000000000000" & motor_ready;
   shown(585)         <= "" & std_logic_vector(resize(motor_u_bus, 32));
-  shown(586 to 1023) <= (others => (others => '0'));
+  shown(586)         <= "" & std_logic_vector(resize(motor_temp_winding, 32));
+  shown(587)         <= "" & std_logic_vector(resize(motor_temp_magnet, 32));
+  shown(588 to 1023) <= (others => (others => '0'));
 
 end architecture rtl;

@@ -43,59 +43,60 @@ package body register_map_pkg is
 
   constant ACCESS_OF : access_t :=
   (
-    0 to 10 | 32 to 48 | 50 to 59 | 184 to 185 | 214 to 221 | 248 to 251 | 256 to 258 | 272 to 282 | 284 to 292 | 576 to 585                                                                                                                    => REGISTER_READ_ONLY,
-    11 to 15 | 31 | 49 | 60 to 63 | 107 | 147 | 158 to 159 | 181 to 183 | 186 to 207 | 225 to 239 | 252 to 255 | 259 | 266 to 271 | 283 | 293 to 319 | 375 to 511 | 518 to 519 | 531 | 535 | 540 to 543 | 557 to 559 | 565 to 575 | 586 to 1023 => REGISTER_NONE,
-    16 to 17 | 19 | 26 to 27 | 240 to 247 | 260 to 265 | 512 to 517 | 520 to 530 | 532 to 534 | 536 to 539 | 544 to 556 | 560 to 564                                                                                                            => REGISTER_AT_ONCE,
-    18 | 20 to 25 | 28 to 30 | 64 to 106 | 108 to 146 | 148 to 157 | 160 to 180 | 208 to 213 | 222 to 224 | 320 to 374                                                                                                                          => REGISTER_BETWEEN
+    0 to 10 | 32 to 48 | 50 to 59 | 184 to 185 | 214 to 221 | 248 to 251 | 256 to 258 | 272 to 282 | 284 to 292 | 576 to 587                                                                                                                          => REGISTER_READ_ONLY,
+    11 to 15 | 31 | 49 | 60 to 63 | 107 | 147 | 158 to 159 | 181 to 183 | 186 to 207 | 225 to 239 | 252 to 255 | 259 | 266 to 271 | 283 | 293 to 319 | 375 to 511 | 518 to 519 | 531 | 535 | 540 to 543 | 558 to 559 | 565 to 567 | 575 | 588 to 1023 => REGISTER_NONE,
+    16 to 17 | 19 | 26 to 27 | 240 to 247 | 260 to 265 | 512 to 517 | 520 to 530 | 532 to 534 | 536 to 539 | 544 to 557 | 560 to 564 | 568 to 574                                                                                                     => REGISTER_AT_ONCE,
+    18 | 20 to 25 | 28 to 30 | 64 to 106 | 108 to 146 | 148 to 157 | 160 to 180 | 208 to 213 | 222 to 224 | 320 to 374                                                                                                                                => REGISTER_BETWEEN
   );
 
   constant RANGE_OF : range_t :=
   (
-    0 to 15 | 31 to 63 | 107 | 147 | 158 to 159 | 161 | 170 to 171 | 181 to 207 | 214 to 221 | 225 to 239 | 248 to 259 | 266 to 319 | 375 to 511 | 518 to 519 | 531 | 535 | 540 to 543 | 557 to 559 | 565 to 1023 => to_unsigned(0, REGISTER_RANGE_W),
-    16 to 19 | 23 | 25 | 29 to 30 | 74 | 83 | 112 | 144 | 148 | 160 | 169 | 175 | 240 to 241 | 260 to 262 | 327 | 334 to 336 | 339 | 342 to 343 | 350 to 354 | 368 | 514 to 515 | 517 | 539 | 564                 => to_unsigned(15, REGISTER_RANGE_W),
-    20 to 22 | 28 | 67 to 69 | 71 | 90 | 176 to 177 | 516 | 548 to 551                                                                                                                                            => to_unsigned(5, REGISTER_RANGE_W),
-    24 | 109 to 111                                                                                                                                                                                               => to_unsigned(6, REGISTER_RANGE_W),
-    26 to 27 | 243 | 265 | 344 | 346 | 530                                                                                                                                                                        => to_unsigned(20, REGISTER_RANGE_W),
-    64 to 66 | 70 | 95 | 102 | 105 | 132 | 135 | 145 | 150 | 152 | 163 | 247 | 337 | 348 to 349 | 365 | 371 | 373 to 374 | 555                                                                                    => to_unsigned(27, REGISTER_RANGE_W),
-    72 | 82 | 91 | 98 | 101 | 103 to 104 | 106 | 115 to 122 | 138 | 143 | 154 | 156 to 157 | 164 | 174 | 178 to 179 | 208 | 222 to 224 | 242 | 323 | 370 | 520 | 533                                              => to_unsigned(29, REGISTER_RANGE_W),
-    73                                                                                                                                                                                                            => to_unsigned(8, REGISTER_RANGE_W),
-    75 | 212 | 263 | 324 | 328 to 329 | 340 | 562 to 563                                                                                                                                                          => to_unsigned(30, REGISTER_RANGE_W),
-    76 | 80 to 81 | 84 to 89 | 97 | 108 | 123 | 140 | 142 | 149 | 151 | 153 | 162 | 172 to 173 | 209 to 210 | 523 to 525 | 536 to 538                                                                             => to_unsigned(36, REGISTER_RANGE_W),
-    77                                                                                                                                                                                                            => to_unsigned(28, REGISTER_RANGE_W),
-    78 | 347 | 367                                                                                                                                                                                                => to_unsigned(19, REGISTER_RANGE_W),
-    79 | 92 to 93 | 130 | 141 | 211 | 246 | 325 | 561                                                                                                                                                             => to_unsigned(26, REGISTER_RANGE_W),
-    94 | 113 | 330                                                                                                                                                                                                => to_unsigned(32, REGISTER_RANGE_W),
-    96 | 321 | 560                                                                                                                                                                                                => to_unsigned(16, REGISTER_RANGE_W),
-    99                                                                                                                                                                                                            => to_unsigned(13, REGISTER_RANGE_W),
-    100                                                                                                                                                                                                           => to_unsigned(14, REGISTER_RANGE_W),
-    114                                                                                                                                                                                                           => to_unsigned(33, REGISTER_RANGE_W),
-    124 to 129 | 131 | 133 | 136 to 137                                                                                                                                                                           => to_unsigned(24, REGISTER_RANGE_W),
-    134 | 146 | 320 | 331                                                                                                                                                                                         => to_unsigned(25, REGISTER_RANGE_W),
-    139 | 534                                                                                                                                                                                                     => to_unsigned(35, REGISTER_RANGE_W),
-    155 | 165 to 166 | 326                                                                                                                                                                                        => to_unsigned(38, REGISTER_RANGE_W),
-    167                                                                                                                                                                                                           => to_unsigned(17, REGISTER_RANGE_W),
-    168 | 355 to 358                                                                                                                                                                                              => to_unsigned(18, REGISTER_RANGE_W),
-    180                                                                                                                                                                                                           => to_unsigned(9, REGISTER_RANGE_W),
-    213 | 521 to 522                                                                                                                                                                                              => to_unsigned(34, REGISTER_RANGE_W),
-    244 to 245                                                                                                                                                                                                    => to_unsigned(4, REGISTER_RANGE_W),
-    264                                                                                                                                                                                                           => to_unsigned(1, REGISTER_RANGE_W),
-    322                                                                                                                                                                                                           => to_unsigned(31, REGISTER_RANGE_W),
-    332 to 333 | 338 | 345                                                                                                                                                                                        => to_unsigned(21, REGISTER_RANGE_W),
-    341 | 552 to 553                                                                                                                                                                                              => to_unsigned(23, REGISTER_RANGE_W),
-    359 to 360                                                                                                                                                                                                    => to_unsigned(7, REGISTER_RANGE_W),
-    361 to 364                                                                                                                                                                                                    => to_unsigned(22, REGISTER_RANGE_W),
-    366                                                                                                                                                                                                           => to_unsigned(10, REGISTER_RANGE_W),
-    369                                                                                                                                                                                                           => to_unsigned(12, REGISTER_RANGE_W),
-    372                                                                                                                                                                                                           => to_unsigned(11, REGISTER_RANGE_W),
-    512                                                                                                                                                                                                           => to_unsigned(3, REGISTER_RANGE_W),
-    513 | 526 to 527 | 544 to 547                                                                                                                                                                                 => to_unsigned(2, REGISTER_RANGE_W),
-    528 to 529 | 532 | 554 | 556                                                                                                                                                                                  => to_unsigned(37, REGISTER_RANGE_W)
+    0 to 15 | 31 to 63 | 107 | 147 | 158 to 159 | 161 | 170 to 171 | 181 to 207 | 214 to 221 | 225 to 239 | 248 to 259 | 266 to 319 | 375 to 511 | 518 to 519 | 531 | 535 | 540 to 543 | 558 to 559 | 565 to 567 | 575 to 1023 => to_unsigned(0, REGISTER_RANGE_W),
+    16 to 19 | 23 | 25 | 29 to 30 | 74 | 83 | 112 | 144 | 148 | 160 | 169 | 175 | 240 to 241 | 260 to 262 | 327 | 334 to 336 | 339 | 342 to 343 | 350 to 354 | 368 | 514 to 515 | 517 | 539 | 564                              => to_unsigned(15, REGISTER_RANGE_W),
+    20 to 22 | 28 | 67 to 69 | 71 | 90 | 176 to 177 | 516 | 548 to 551                                                                                                                                                         => to_unsigned(5, REGISTER_RANGE_W),
+    24 | 109 to 111 | 568 to 569                                                                                                                                                                                               => to_unsigned(6, REGISTER_RANGE_W),
+    26 to 27 | 243 | 265 | 344 | 346 | 530                                                                                                                                                                                     => to_unsigned(20, REGISTER_RANGE_W),
+    64 to 66 | 70 | 95 | 102 | 105 | 132 | 135 | 145 | 150 | 152 | 163 | 247 | 337 | 348 to 349 | 365 | 371 | 373 to 374 | 555                                                                                                 => to_unsigned(27, REGISTER_RANGE_W),
+    72 | 82 | 91 | 98 | 101 | 103 to 104 | 106 | 115 to 122 | 138 | 143 | 154 | 156 to 157 | 164 | 174 | 178 to 179 | 208 | 222 to 224 | 242 | 323 | 370 | 520 | 533 | 557 | 573 to 574                                        => to_unsigned(29, REGISTER_RANGE_W),
+    73                                                                                                                                                                                                                         => to_unsigned(8, REGISTER_RANGE_W),
+    75 | 212 | 263 | 324 | 328 to 329 | 340 | 562 to 563                                                                                                                                                                       => to_unsigned(30, REGISTER_RANGE_W),
+    76 | 80 to 81 | 84 to 89 | 97 | 108 | 123 | 140 | 142 | 149 | 151 | 153 | 162 | 172 to 173 | 209 to 210 | 523 to 525 | 536 to 538 | 570                                                                                    => to_unsigned(37, REGISTER_RANGE_W),
+    77                                                                                                                                                                                                                         => to_unsigned(28, REGISTER_RANGE_W),
+    78 | 347 | 367                                                                                                                                                                                                             => to_unsigned(19, REGISTER_RANGE_W),
+    79 | 92 to 93 | 130 | 141 | 211 | 246 | 325 | 561                                                                                                                                                                          => to_unsigned(26, REGISTER_RANGE_W),
+    94 | 113 | 330                                                                                                                                                                                                             => to_unsigned(32, REGISTER_RANGE_W),
+    96 | 321 | 560                                                                                                                                                                                                             => to_unsigned(16, REGISTER_RANGE_W),
+    99                                                                                                                                                                                                                         => to_unsigned(13, REGISTER_RANGE_W),
+    100                                                                                                                                                                                                                        => to_unsigned(14, REGISTER_RANGE_W),
+    114                                                                                                                                                                                                                        => to_unsigned(33, REGISTER_RANGE_W),
+    124 to 129 | 131 | 133 | 136 to 137                                                                                                                                                                                        => to_unsigned(24, REGISTER_RANGE_W),
+    134 | 146 | 320 | 331                                                                                                                                                                                                      => to_unsigned(25, REGISTER_RANGE_W),
+    139 | 534                                                                                                                                                                                                                  => to_unsigned(36, REGISTER_RANGE_W),
+    155 | 165 to 166 | 326                                                                                                                                                                                                     => to_unsigned(39, REGISTER_RANGE_W),
+    167                                                                                                                                                                                                                        => to_unsigned(17, REGISTER_RANGE_W),
+    168 | 355 to 358                                                                                                                                                                                                           => to_unsigned(18, REGISTER_RANGE_W),
+    180                                                                                                                                                                                                                        => to_unsigned(9, REGISTER_RANGE_W),
+    213 | 521 to 522                                                                                                                                                                                                           => to_unsigned(35, REGISTER_RANGE_W),
+    244 to 245                                                                                                                                                                                                                 => to_unsigned(4, REGISTER_RANGE_W),
+    264                                                                                                                                                                                                                        => to_unsigned(1, REGISTER_RANGE_W),
+    322                                                                                                                                                                                                                        => to_unsigned(31, REGISTER_RANGE_W),
+    332 to 333 | 338 | 345                                                                                                                                                                                                     => to_unsigned(21, REGISTER_RANGE_W),
+    341 | 552 to 553                                                                                                                                                                                                           => to_unsigned(23, REGISTER_RANGE_W),
+    359 to 360                                                                                                                                                                                                                 => to_unsigned(7, REGISTER_RANGE_W),
+    361 to 364                                                                                                                                                                                                                 => to_unsigned(22, REGISTER_RANGE_W),
+    366                                                                                                                                                                                                                        => to_unsigned(10, REGISTER_RANGE_W),
+    369                                                                                                                                                                                                                        => to_unsigned(12, REGISTER_RANGE_W),
+    372                                                                                                                                                                                                                        => to_unsigned(11, REGISTER_RANGE_W),
+    512                                                                                                                                                                                                                        => to_unsigned(3, REGISTER_RANGE_W),
+    513 | 526 to 527 | 544 to 547                                                                                                                                                                                              => to_unsigned(2, REGISTER_RANGE_W),
+    528 to 529 | 532 | 554 | 556                                                                                                                                                                                               => to_unsigned(38, REGISTER_RANGE_W),
+    571 to 572                                                                                                                                                                                                                 => to_unsigned(34, REGISTER_RANGE_W)
   );
 
   constant SIGNED_OF : signed_t :=
   (
-    0 to 34 | 36 | 40 | 49 to 183 | 186 to 213 | 220 to 575 | 581 to 584 | 586 to 1023 => '0',
-    35 | 37 to 39 | 41 to 48 | 184 to 185 | 214 to 219 | 576 to 580 | 585              => '1'
+    0 to 34 | 36 | 40 | 49 to 183 | 186 to 213 | 220 to 575 | 581 to 584 | 588 to 1023 => '0',
+    35 | 37 to 39 | 41 to 48 | 184 to 185 | 214 to 219 | 576 to 580 | 585 to 587       => '1'
   );
 
   constant LOW_OF : low_t :=
@@ -118,10 +119,10 @@ package body register_map_pkg is
 
   constant HIGH_OF : high_t :=
   (
-    0 | 38     => to_signed(2147483647, REGISTER_LIMIT_W),
-    1 | 37     => to_signed(33554431, REGISTER_LIMIT_W),
-    2 | 36     => to_signed(16777215, REGISTER_LIMIT_W),
-    3 | 35     => to_signed(8388607, REGISTER_LIMIT_W),
+    0 | 39     => to_signed(2147483647, REGISTER_LIMIT_W),
+    1 | 38     => to_signed(33554431, REGISTER_LIMIT_W),
+    2 | 37     => to_signed(16777215, REGISTER_LIMIT_W),
+    3 | 36     => to_signed(8388607, REGISTER_LIMIT_W),
     4 | 30     => to_signed(262143, REGISTER_LIMIT_W),
     5 | 9 | 29 => to_signed(131071, REGISTER_LIMIT_W),
     6          => to_signed(32767, REGISTER_LIMIT_W),
@@ -146,8 +147,9 @@ package body register_map_pkg is
     31         => to_signed(524287, REGISTER_LIMIT_W),
     32         => to_signed(1048575, REGISTER_LIMIT_W),
     33         => to_signed(1179647, REGISTER_LIMIT_W),
-    34         => to_signed(4194303, REGISTER_LIMIT_W),
-    39 to 63   => to_signed(0, REGISTER_LIMIT_W)
+    34         => to_signed(2097151, REGISTER_LIMIT_W),
+    35         => to_signed(4194303, REGISTER_LIMIT_W),
+    40 to 63   => to_signed(0, REGISTER_LIMIT_W)
   );
 
   function register_access_of (word : unsigned(REGISTER_WORD_W - 1 downto 0)) return unsigned is

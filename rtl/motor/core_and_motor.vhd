@@ -63,6 +63,14 @@ entity core_and_motor is
     motor_zero_b        : in  signed(PU_W - 1 downto 0);
     motor_zero_c        : in  signed(PU_W - 1 downto 0);
     motor_zero_u        : in  signed(PU_W - 1 downto 0);
+    motor_k_filter      : in  unsigned(16 downto 0);
+    motor_ambient       : in  signed(15 downto 0);
+    motor_t_ref         : in  signed(15 downto 0);
+    motor_heating       : in  unsigned(23 downto 0);
+    motor_k_winding     : in  unsigned(20 downto 0);
+    motor_k_magnet      : in  unsigned(20 downto 0);
+    motor_tcr_winding   : in  unsigned(16 downto 0);
+    motor_tcr_magnet    : in  unsigned(16 downto 0);
     motor_noise_i       : in  unsigned(7 downto 0);
     motor_noise_u       : in  unsigned(7 downto 0);
     motor_angle_offset  : in  unsigned(MOTOR_ANGLE_W - 1 downto 0);
@@ -84,6 +92,8 @@ entity core_and_motor is
     motor_theta_m       : out unsigned(MOTOR_ANGLE_W - 1 downto 0);
     motor_theta_e       : out unsigned(MOTOR_ANGLE_W - 1 downto 0);
     motor_u_bus         : out signed(MOTOR_VOLTAGE_W - 1 downto 0);
+    motor_temp_winding  : out signed(15 downto 0);
+    motor_temp_magnet   : out signed(15 downto 0);
     motor_shoot_through : out std_logic
   );
 end entity core_and_motor;
@@ -150,7 +160,12 @@ begin
       motor_table_select => motor_table_select, motor_table_at => motor_table_at, motor_scale_a => motor_scale_a,
       motor_scale_b => motor_scale_b, motor_scale_c => motor_scale_c, motor_scale_u => motor_scale_u,
       motor_zero_a => motor_zero_a, motor_zero_b => motor_zero_b, motor_zero_c => motor_zero_c,
-      motor_zero_u => motor_zero_u, motor_noise_i => motor_noise_i, motor_noise_u => motor_noise_u,
+      motor_zero_u => motor_zero_u, motor_k_filter => motor_k_filter, motor_ambient => motor_ambient,
+      motor_t_ref => motor_t_ref, motor_heating => motor_heating, motor_k_winding => motor_k_winding,
+      motor_k_magnet => motor_k_magnet, motor_tcr_winding => motor_tcr_winding, motor_tcr_magnet => motor_tcr_magnet,
+      motor_temp_winding => motor_temp_winding, motor_temp_magnet => motor_temp_magnet,
+      motor_noise_i => motor_noise_i,
+      motor_noise_u => motor_noise_u,
       motor_angle_offset => motor_angle_offset, motor_i_a => motor_i_a, motor_i_b => motor_i_b, motor_i_c => motor_i_c,
       motor_torque => motor_torque, motor_omega_m => motor_omega_m, motor_theta_m => motor_theta_m,
       motor_theta_e => motor_theta_e, motor_inv_c => motor_inv_c, motor_k_source => motor_k_source,

@@ -15,7 +15,8 @@ use work.fluxproof_pkg.all;
 entity motor_bench is
   generic (
     ADC_BITS      : positive range 12 to 16 := 12;
-    POSITION_BITS : positive range 12 to 18 := 16
+    POSITION_BITS : positive range 12 to 18 := 16;
+    TEMPERATURES  : natural range 0 to 1    := 1
   );
   port (
     clk                 : in  std_logic;
@@ -61,6 +62,14 @@ entity motor_bench is
     motor_zero_b        : in  signed(PU_W - 1 downto 0);
     motor_zero_c        : in  signed(PU_W - 1 downto 0);
     motor_zero_u        : in  signed(PU_W - 1 downto 0);
+    motor_k_filter      : in  unsigned(16 downto 0);
+    motor_ambient       : in  signed(15 downto 0);
+    motor_t_ref         : in  signed(15 downto 0);
+    motor_heating       : in  unsigned(23 downto 0);
+    motor_k_winding     : in  unsigned(20 downto 0);
+    motor_k_magnet      : in  unsigned(20 downto 0);
+    motor_tcr_winding   : in  unsigned(16 downto 0);
+    motor_tcr_magnet    : in  unsigned(16 downto 0);
     motor_noise_i       : in  unsigned(7 downto 0);
     motor_noise_u       : in  unsigned(7 downto 0);
     motor_angle_offset  : in  unsigned(MOTOR_ANGLE_W - 1 downto 0);
@@ -88,6 +97,8 @@ entity motor_bench is
     motor_theta_m       : out unsigned(MOTOR_ANGLE_W - 1 downto 0);
     motor_theta_e       : out unsigned(MOTOR_ANGLE_W - 1 downto 0);
     motor_u_bus         : out signed(MOTOR_VOLTAGE_W - 1 downto 0);
+    motor_temp_winding  : out signed(15 downto 0);
+    motor_temp_magnet   : out signed(15 downto 0);
     motor_shoot_through : out std_logic
   );
 end entity motor_bench;
@@ -102,6 +113,16 @@ architecture rtl of motor_bench is
   signal charge    : signed(MOTOR_CHARGE_W - 1 downto 0);
   signal u_bus     : signed(MOTOR_VOLTAGE_W - 1 downto 0);
   signal u_next    : signed(MOTOR_VOLTAGE_W - 1 downto 0);
+  signal hot_a     : unsigned(23 downto 0);
+  signal hot_b     : unsigned(23 downto 0);
+  signal hot_c     : unsigned(23 downto 0);
+  signal hot_psi   : signed(FLUX_W - 1 downto 0);
+  signal y_a       : signed(PU_W - 1 downto 0);
+  signal y_b       : signed(PU_W - 1 downto 0);
+  signal y_c       : signed(PU_W - 1 downto 0);
+  signal i_a_0     : signed(PU_W - 1 downto 0);
+  signal i_b_0     : signed(PU_W - 1 downto 0);
+  signal i_c_0     : signed(PU_W - 1 downto 0);
   signal i_a_1     : signed(PU_W - 1 downto 0);
   signal i_b_1     : signed(PU_W - 1 downto 0);
   signal i_c_1     : signed(PU_W - 1 downto 0);
@@ -115,15 +136,20 @@ begin
   starts <= motor_start or not motor_ready;
   u_next <= motor_u_dc when starts = '1' else u_bus;
 
+  -- What the converters see; without a filter the currents at once
+  i_a_0 <= motor_i_a when motor_k_filter = 0 else y_a;
+  i_b_0 <= motor_i_b when motor_k_filter = 0 else y_b;
+  i_c_0 <= motor_i_c when motor_k_filter = 0 else y_c;
+
   -- Sample and hold
   process (clk)
   begin
     if rising_edge(clk) then
       held <= sample_trigger;
       if sample_trigger = '1' then
-        i_a_1     <= motor_i_a;
-        i_b_1     <= motor_i_b;
-        i_c_1     <= motor_i_c;
+        i_a_1     <= i_a_0;
+        i_b_1     <= i_b_0;
+        i_c_1     <= i_c_0;
         u_dc_1    <= motor_u_bus;
         theta_m_1 <= motor_theta_m;
       end if;
@@ -172,18 +198,46 @@ begin
       rectifier => motor_rectifier, out_valid => open, u_dc => u_bus
     );
 
+  warm : if TEMPERATURES = 1 generate
+    heat : entity work.motor_heat
+      generic map (WINDOW_BITS => MOTOR_HEAT_WINDOW_BITS)
+      port map (
+        clk => clk, rst => rst, in_valid => ticked(2), i_a => motor_i_a, i_b => motor_i_b, i_c => motor_i_c,
+        start => start_1, r_a => motor_r_a, r_b => motor_r_b, r_c => motor_r_c, psi_m => motor_psi_m,
+        ambient => motor_ambient, t_ref => motor_t_ref, heating => motor_heating, k_winding => motor_k_winding,
+        k_magnet => motor_k_magnet, tcr_winding => motor_tcr_winding, tcr_magnet => motor_tcr_magnet,
+        out_valid => open, hot_a => hot_a, hot_b => hot_b, hot_c => hot_c, hot_psi => hot_psi,
+        temp_winding => motor_temp_winding, temp_magnet => motor_temp_magnet
+      );
+  end generate;
+
+  cold : if TEMPERATURES = 0 generate
+    hot_a              <= motor_r_a;
+    hot_b              <= motor_r_b;
+    hot_c              <= motor_r_c;
+    hot_psi            <= motor_psi_m;
+    motor_temp_winding <= motor_ambient;
+    motor_temp_magnet  <= motor_ambient;
+  end generate;
+
   load_machine : entity work.motor_model
     port map (
       clk => clk, rst => rst, gate_high => gate_high, gate_low => gate_low, u_dc => u_next, load => motor_load,
       start => motor_start, clear_faults => motor_clear_faults, stiffness => motor_stiffness,
-      v_switch => motor_v_switch, v_diode => motor_v_diode, r_a => motor_r_a, r_b => motor_r_b, r_c => motor_r_c,
-      psi_start => motor_psi_start, psi_m => motor_psi_m, inv_l_d => motor_inv_l_d, inv_l_q => motor_inv_l_q,
+      v_switch => motor_v_switch, v_diode => motor_v_diode, r_a => hot_a, r_b => hot_b, r_c => hot_c,
+      psi_start => motor_psi_start, psi_m => hot_psi, inv_l_d => motor_inv_l_d, inv_l_q => motor_inv_l_q,
       k_j => motor_k_j, viscous => motor_viscous, coulomb => motor_coulomb, pole_pairs => motor_pole_pairs,
       hold => motor_hold, omega_set => motor_omega_set, table_write => motor_table_write,
       table_select => motor_table_select, table_at => motor_table_at, table_word => motor_table_high & motor_table_low, tick => tick,
       ready => motor_ready, i_a => motor_i_a, i_b => motor_i_b, i_c => motor_i_c, torque => motor_torque,
       omega_m => motor_omega_m, theta_m => motor_theta_m, theta_e => motor_theta_e,
       shoot_through => motor_shoot_through
+    );
+
+  current_filter : entity work.motor_filter
+    port map (
+      clk => clk, rst => rst, in_valid => ticked(2), i_a => motor_i_a, i_b => motor_i_b, i_c => motor_i_c,
+      k_filter => motor_k_filter, out_valid => open, y_a => y_a, y_b => y_b, y_c => y_c
     );
 
   sensors : entity work.motor_sensors

@@ -57,6 +57,7 @@ HIL = Top(
         "POSITION_BITS": ("integer range 12 to 18", 16, "width of the position code"),
         "ENCODER": ("integer range 0 to 3", 0, "the kind of encoder, see above"),
         "CURRENTS": ("integer range 0 to 0", 0, "codes"),
+        "TEMPERATURES": ("integer range 0 to 1", 1, "0 leaves the temperatures out: hot is as cold"),
         "SPI_LINES": ("integer range 1 to 1", 1, "none is used"),
     },
     tuple(pin for pin in axi_top.PINS if pin[0] not in board_top.INSIDE),

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from scripts.prove.pipeline import ports
 from scripts.prove.proof import Fault, Proof
 
-INVERTER, SHAFT = "motor/motor_inverter.vhd", "motor/motor_shaft.vhd"
+INVERTER, SHAFT, FILTER = "motor/motor_inverter.vhd", "motor/motor_shaft.vhd", "motor/motor_filter.vhd"
 
 # The voltages of leg a as the entity takes them, summed in 34 bits
 SUM = """\
@@ -64,6 +64,50 @@ BRAKES = """\
     if ((seen && n != 10 && n != 11 && n != 12) || n == 13) assert ($signed(omega_m) == omega >>> 19);
     if (seen && n != 0 && n != 13) assert ($signed(omega_m) == last);
     if (seen && n >= 10 && n <= 12) assert (!(last > 0 && omega < 0) && !(last < 0 && omega > 0));
+  end
+`endif
+"""
+
+# A phase on its way through the ring, with the current that entered beside it
+BETWEEN = """\
+  reg [3:0] n = 0;  // clocks since a sample went in, 0 without one
+  wire [3:0] now = in_valid ? 0 : n;
+  reg signed [24:0] i_1, i_2, i_3, d_2;
+  reg signed [40:0] y_3, rest_3;
+  reg added = 0, turned = 0, cleared = 1;
+  wire signed [17:0] i = now == 1 ? i_b : now == 2 ? i_c : i_a;
+  wire signed [23:0] old = y_3[40:17], new = seen_y_3[40:17];
+  always @(posedge clk) begin
+    n <= rst ? 0 : in_valid ? 1 : n == 7 || n == 0 ? 0 : n + 1;
+    {i_1, i_2, i_3} <= {{i[17], i, 6'b0}, i_1, i_2};
+    d_2 <= seen_d_1;
+    y_3 <= seen_y_2;
+    rest_3 <= seen_y_3;
+    turned <= now <= 5 && (in_valid || n != 0);
+    cleared <= rst;
+    added <= !rst && n >= 2 && n <= 4;
+  end
+  always @* if (in_valid) assume (n == 0 || n == 7);
+  reg signed [43:0] least, most;
+  always @* begin
+    most = (44'sd131072 * d_2) - d_2;  // the largest k
+    least = 0;
+    if (d_2 < 0) {least, most} = {most, 44'sd0};
+    assume ($signed(seen_prod_2) >= least && $signed(seen_prod_2) <= most);
+  end
+
+  always @(posedge clk) if (begun && !added && !cleared) assert ($signed(seen_y_3) == (turned ? y_3 : rest_3));
+  always @(posedge clk) if (begun && added) begin
+    assert (old > i_3 || (new >= old && new <= i_3));
+    assert (old < i_3 || ($signed(seen_y_3) <= y_3 && new >= i_3));
+    cover (new > old && new < i_3);
+  end
+`ifdef LEMMAS
+  integer k;
+  always @(posedge clk) if (begun) begin
+    for (k = 1; k <= 7; k = k + 1) assert (spy_valid[7 - k] == (n == k));
+    if (n >= 1 && n <= 3) assert ($signed(seen_d_1) == i_1 - $signed(spy_y_1[40:17]));
+    if (n >= 2 && n <= 4) assert (d_2 == i_2 - $signed(seen_y_2[40:17]));
   end
 `endif
 """
@@ -128,5 +172,22 @@ PROOFS = (
         free=("sum_8",),
         assumed="samples at least 13 clocks apart, coulomb not 0, hold = 0; the products may have any value",
         search_depth=44,
+    ),
+    Proof(
+        name="motor_filter_between",
+        says="a filtered current lies between what it was and the current: it never swings over, nothing wraps",
+        entity="motor_filter",
+        harness=around("motor_filter", BETWEEN),
+        faults=(
+            Fault("another phase's current", FILTER, "i_b when valid(1) = '1'", "i_c when valid(1) = '1'"),
+            Fault("added a turn early", FILTER, "if (or valid(2 to 4)) = '1' then", "if (or valid(1 to 3)) = '1' then"),
+            Fault("the difference of another phase", FILTER, "MOTOR_FILTER_LIFT) - y_3(", "MOTOR_FILTER_LIFT) - y_2("),
+        ),
+        depth=4,
+        spies=("valid", "y_1"),
+        seen=("prod_2", "d_1", "y_2", "y_3"),
+        free=("prod_2",),
+        assumed="samples at least 7 clocks apart; any product between 0 and that of the largest k",
+        search_depth=24,
     ),
 )  # fmt: skip

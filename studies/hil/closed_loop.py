@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,11 +20,21 @@ from fluxproof.cosim.golden_clock import GoldenClock
 from fluxproof.cosim.golden_loop import mixed_kernel
 from fluxproof.cosim.sleeping import with_sleep
 from fluxproof.cosim.verilated import VerilatedCore
-from fluxproof.hil.registers import Scale, bus_registers, motor_registers, motor_scale, motor_tables
+from fluxproof.hil.registers import (
+    Scale,
+    Thermal,
+    bus_registers,
+    filter_register,
+    heat_registers,
+    motor_registers,
+    motor_scale,
+    motor_tables,
+)
 from fluxproof.plant.bus import Bus
+from fluxproof.plant.pmsm import Machine
 from golden_model import fluxproof
 from golden_model.drive import Drive, load
-from golden_model.motor import motor_bench, motor_bus, motor_model, motor_sensors, motor_shaft
+from golden_model.motor import motor_bench, motor_bus, motor_heat, motor_model, motor_sensors, motor_shaft
 from golden_model.motor.motor_model import STEP
 from golden_model.registers import RegisterSet, registers
 from golden_model.units import from_si
@@ -38,6 +48,9 @@ CONVERSION = 13  # clocks from sample_trigger to sample_valid
 MotorInputs, bench_step = motor_model.Inputs, motor_bench.step
 SPEED_RAD_S, LOAD_NM = 100.0, 0.1
 BUS = Bus(capacitance=470e-6, source_ohm=0.1, diode=True, brake_ohm=5.0)
+FILTER_S = 5e-6  # of the current sensors
+COPPER = replace(SERVO, resistance_temp_coeff_per_k=0.0039, magnet_temp_coeff_per_k=-0.001)
+THERMAL = Thermal(winding_j_per_k=1.0, winding_s=6.0, magnet_s=8.0, ambient_c=60.0)
 PERIODS = 300
 HELD = 200  # periods of a speed
 
@@ -52,24 +65,41 @@ class Parts(NamedTuple):
     tables: motor_model.Tables
     sensors: motor_sensors.Registers
     bus: motor_bus.Registers
+    k_filter: int
+    heat: motor_heat.Own
+
+    def hil(self) -> golden_loop.Hil:
+        """What the compiled loop takes."""
+        u_dc = self.scale.u_dc(self.drive.inverter.dc_bus_v)
+        values, config = self.core.values, self.core.config
+        return golden_loop.Hil(
+            values, config, self.motor, self.tables, self.sensors, u_dc, self.bus, self.k_filter, self.heat
+        )
+
+    def of_motor(self) -> dict[str, int]:
+        """The registers of motor, sensors and bus by name."""
+        own = {**self.motor._asdict(), **self.sensors._asdict(), **self.bus._asdict(), **self.heat._asdict()}
+        own |= {"k_filter": self.k_filter}
+        return {f"motor_{name}": value for name, value in own.items()}
 
 
-def parts(drive: Drive | None = None) -> Parts:
-    """The core and the sensors of a drive, by default servo_24v, with the motor of the study."""
+def parts(drive: Drive | None = None, machine: Machine = SERVO, bus: Bus = BUS) -> Parts:
+    """The core and the sensors of a drive, by default servo_24v, with the motor of the study and its bus."""
     drive = drive or load(DRIVES / "servo_24v.toml")
     of_core, sensors = registers(drive), drive.sensors
-    scale = motor_scale(SERVO, drive.inverter.dc_bus_v, sensors.current_range_a, drive.core.clock_hz)
+    scale = motor_scale(machine, drive.inverter.dc_bus_v, sensors.current_range_a, drive.core.clock_hz)
     unit = 1 << motor_sensors.SENSOR_GAIN.frac_bits
-    bus = round(2 * scale.voltage_v / sensors.u_dc_range_v * unit)
-    scales = {"scale_a": unit, "scale_b": unit, "scale_c": unit, "scale_u": bus}
+    bus_unit = round(2 * scale.voltage_v / sensors.u_dc_range_v * unit)
+    scales = {"scale_a": unit, "scale_b": unit, "scale_c": unit, "scale_u": bus_unit}
     still = dict.fromkeys(motor_sensors.Registers._fields, 0) | scales | {"noise_i": 20}
-    motor, tables = motor_registers(scale, SERVO, SWITCHES), motor_tables(scale, SERVO)
-    bus = bus_registers(scale, BUS)
-    return Parts(drive, of_core, scale, motor, tables, motor_sensors.Registers(**still), bus)
+    motor, tables = motor_registers(scale, machine, SWITCHES), motor_tables(scale, machine)
+    of_bus = bus_registers(scale, bus)
+    k_filter, heat = filter_register(scale, FILTER_S), heat_registers(scale, COPPER, THERMAL)
+    return Parts(drive, of_core, scale, motor, tables, motor_sensors.Registers(**still), of_bus, k_filter, heat)
 
 
 @mixed_kernel
-def follow(bench, words, u_dc, load, motor, bus, tables):
+def follow(bench, words, u_dc, load, motor, bus, k_filter, heat, tables):
     """The motor through whole steps, from the gates of each of their clocks; the brake resistor stays off."""
     counts = np.zeros(6, np.int64)
     for n in range(len(words) // STEP):
@@ -78,7 +108,7 @@ def follow(bench, words, u_dc, load, motor, bus, tables):
             for k in range(6):
                 counts[k] += word >> k & 1
         now = MotorInputs(u_dc, load, 0, counts[0], counts[3], counts[1], counts[4], counts[2], counts[5])
-        bench, _ = bench_step(bench, now, 0, motor, bus, tables, STEP)
+        bench, _ = bench_step(bench, now, 0, motor, bus, k_filter, heat, tables, STEP)
     return bench
 
 
@@ -93,13 +123,15 @@ class GoldenMotor:
 
     def _tick(self, state, load_code):
         inputs = motor_model.Inputs(u_dc=self.u_dc, load=load_code)
-        return motor_bench.step(state, inputs, 0, self.of.motor, self.of.bus, self.of.tables, STEP)
+        of = self.of
+        return motor_bench.step(state, inputs, 0, of.motor, of.bus, of.k_filter, of.heat, of.tables, STEP)
 
     def advance(self, words: np.ndarray, clock: int, load_code: int) -> None:
         """Up to the last tick at or before ``clock``; ``words``: the gates of every clock so far."""
         steps = clock // STEP - self.ticks
         part = words[self.ticks * STEP : (self.ticks + steps) * STEP].astype(np.int64)
-        self.state = follow(self.state, part, self.u_dc, load_code, self.of.motor, self.of.bus, self.of.tables)
+        of = self.of
+        self.state = follow(self.state, part, self.u_dc, load_code, of.motor, of.bus, of.k_filter, of.heat, of.tables)
         self.ticks += steps
 
     def codes(self, clock: int, load_code: int) -> tuple[int, ...]:
@@ -110,7 +142,8 @@ class GoldenMotor:
         if self.ticks - (clock - SHAFT) // STEP == 3:  # the shaft's next step is done already
             theta = self._tick(self.state, load_code)[1].theta_m
         u_dc = self.state.u_dc_1 if clock % STEP == 0 else self.state.u_dc
-        seen = motor_sensors.Inputs(chain.i_a, chain.i_b, chain.i_c, u_dc, theta)
+        currents = motor_bench.converted(self.state, chain, clock, self.of.k_filter)
+        seen = motor_sensors.Inputs(*currents, u_dc, theta)
         config = self.of.core.config
         self.random, codes = motor_sensors.step(
             self.random, seen, self.of.sensors, config.adc_bits, config.position_bits
@@ -161,8 +194,7 @@ def rtl_of(of: Parts, rewrite: Callable[[str], str]) -> VerilatedCore:
     generics = {"ADC_BITS": config.adc_bits, "POSITION_BITS": config.position_bits, "CARRIER_HALF": config.carrier_half}
     core = VerilatedCore(generics, top=f"core_and_motor{FLAT}", rewrite=rewrite)
     core.set_many(of.core.values._asdict())
-    of_motor = {**of.motor._asdict(), **of.sensors._asdict(), **of.bus._asdict()}
-    core.set_many({f"motor_{name}": value for name, value in of_motor.items()})
+    core.set_many(of.of_motor())
     core.set("motor_u_dc", of.scale.u_dc(of.drive.inverter.dc_bus_v))
     core.set_many({name if name in core.inputs else f"{name}_in": v for name, v in references(of).items()})
     write_tables(core, of.tables, "motor_")
@@ -183,9 +215,10 @@ def rtl_run(of: Parts, golden: Run, load_at: int, rewrite: Callable[[str], str] 
     return Run(rows[:, 0] + 8 * rows[:, 1], [core.get_many(golden.observed[-1])], seconds, core.missed)
 
 
-def compare(periods: int) -> tuple[Run, Run]:
+def compare(periods: int, filter_s: float = FILTER_S) -> tuple[Run, Run]:
     """(golden, RTL) of the same closed loop, a load step in the middle."""
     of = parts()
+    of = of._replace(k_filter=filter_register(of.scale, filter_s))
     load_at = periods // 2 * 2 * of.core.config.carrier_half // STEP * STEP
     golden = golden_run(of, periods, load_at)
     return golden, rtl_run(of, golden, load_at)
@@ -207,9 +240,7 @@ def long_run(periods: int, seed: int = 53) -> Long:
     given = references(of)
     asked = np.array([[*given.values(), 0]] * periods, np.int64)
     asked[:, list(given).index("omega_ref")] = omega
-    u_dc = of.scale.u_dc(of.drive.inverter.dc_bus_v)
-    hil = golden_loop.Hil(of.core.values, of.core.config, of.motor, of.tables, of.sensors, u_dc, of.bus)
-    _, observed = golden_loop.record(hil, asked, golden_loop.constant(of.motor, periods))
+    _, observed = golden_loop.record(of.hil(), asked, golden_loop.constant(of.motor, periods))
     names = list(observed)
     wanted = np.stack([observed[name] for name in names], axis=1)
 

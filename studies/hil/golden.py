@@ -15,18 +15,22 @@ import numpy as np
 from fluxproof.commission.simulated_loop import LAST_ANGLE, SOURCE, forced_code
 from fluxproof.cosim.golden_loop import mixed_kernel
 from golden_model import clocked, fluxproof
-from golden_model.motor import motor_bench, motor_bus, motor_model, motor_sensors, motor_shaft
+from golden_model.motor import motor_bench, motor_bus, motor_heat, motor_model, motor_sensors, motor_shaft
 
 CHAIN, SHAFT = 40, 53  # clocks from a tick to its currents, to its angle
 CONVERSION = 13  # clocks from sample_trigger to sample_valid
 STEP, DROP_THETA = motor_model.STEP, motor_shaft.DROP_THETA
 core_step, bench_step, sensors_step = clocked.step, motor_bench.step, motor_sensors.step
+converted = motor_bench.converted
 MotorRegisters = motor_model.Registers
 CoreInputs, MotorInputs, SensorInputs = clocked.Inputs, motor_model.Inputs, motor_sensors.Inputs
 sample_step, Given, Sample = fluxproof.step_given, fluxproof.Given, fluxproof.Sample
 DUE = {name: after for after, names in clocked.DUE.values() for name in names}
 CHECKS, ZERO, MOTION, EMF = DUE["sample_faults"], DUE["current_offset"], DUE["motion_faults"], DUE["encoder_lost"]
 LOAD, BRAKE, COMPARE = DUE["open_load"], DUE["brake_asked"], DUE["compare_a"]
+
+
+COLD = motor_heat.Own(0, 0, 0, 0, 0, 0, 0)  # nothing depends on a temperature
 
 
 class Hil(NamedTuple):
@@ -39,6 +43,8 @@ class Hil(NamedTuple):
     sensors: motor_sensors.Registers
     u_dc: int  # of the source
     bus: motor_bus.Registers = motor_bus.Registers(0, 0, 0, 0)  # no capacitor
+    k_filter: int = 0  # of the current sensors
+    heat: motor_heat.Own = COLD
 
 
 class Moving(NamedTuple):
@@ -168,7 +174,7 @@ def run_clocks(hil, asked, moving, host, forced, carry, samples, observed):
         clock += 1
         if clock % STEP == 0:
             now = MotorInputs(hil.u_dc, 0, 0, counts[0], counts[3], counts[1], counts[4], counts[2], counts[5])
-            motor, _ = bench_step(motor, now, seen.brake, motor_regs, hil.bus, hil.tables, STEP)
+            motor, _ = bench_step(motor, now, seen.brake, motor_regs, hil.bus, hil.k_filter, hil.heat, hil.tables, STEP)
             counts[:] = 0
         word = seen.gate_high | seen.gate_low << 3
         fault_flags, first_fault, tripped = seen.fault_flags, seen.first_fault, seen.tripped
@@ -179,10 +185,11 @@ def run_clocks(hil, asked, moving, host, forced, carry, samples, observed):
             chain = chosen(chains, ticks - (clock - CHAIN) // STEP)
             theta = of_motor.of_shaft.theta >> DROP_THETA
             if ticks - (clock - SHAFT) // STEP == 3:  # the shaft's next step is done already
-                _, ahead = bench_step(motor, still, 0, motor_regs, hil.bus, hil.tables, STEP)
+                _, ahead = bench_step(motor, still, 0, motor_regs, hil.bus, hil.k_filter, hil.heat, hil.tables, STEP)
                 theta = ahead.theta_m
             u_dc = motor.u_dc_1 if clock % STEP == 0 else motor.u_dc
-            at = SensorInputs(chain.i_a, chain.i_b, chain.i_c, u_dc, theta)
+            i_a, i_b, i_c = converted(motor, chain, clock, hil.k_filter)
+            at = SensorInputs(i_a, i_b, i_c, u_dc, theta)
             random, codes = sensors_step(random, at, hil.sensors, config.adc_bits, config.position_bits)
             valid_at = clock + CONVERSION
     of_gates = (counts[0], counts[1], counts[2], counts[3], counts[4], counts[5])
@@ -195,7 +202,7 @@ def run_clocks(hil, asked, moving, host, forced, carry, samples, observed):
 def start(hil: Hil, moving: Moving) -> Carry:
     """The carry of the first call: after the reset, the motor has made its first step."""
     still, regs = MotorInputs(u_dc=hil.u_dc), written(hil.motor, moving, 0)
-    motor, _ = bench_step(motor_bench.State(), still, 0, regs, hil.bus, hil.tables, STEP)
+    motor, _ = bench_step(motor_bench.State(), still, 0, regs, hil.bus, hil.k_filter, hil.heat, hil.tables, STEP)
     none = CoreInputs(enable=1)
     return Carry(
         core=clocked.State(), of_samples=fluxproof.State(), motor=motor, random=motor_sensors.State(), old=none,

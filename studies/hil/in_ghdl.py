@@ -1,17 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Core and motor in one (`core_and_motor`) in GHDL, the VHDL as it is: its gates at every clock against the models.
 
-python -m studies.hil.in_ghdl [PERIODS]
+python -m studies.hil.in_ghdl [PERIODS [HALF]]
 
 A bench without software: constants at all inputs, the gates of every clock in a file.  The motor is linear, as its
-tables stay as an FPGA's configuration leaves them; a period has 3000 clocks.
+tables stay as an FPGA's configuration leaves them.  HALF: clocks of half a period.  With few of them a step of the
+motor is so long that 1/J of the shaft fits no register: then the shaft is held at a speed.
 """
 
 from __future__ import annotations
 
+import math
+import resource
 import subprocess
 import sys
-import time
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,11 +24,16 @@ from fluxproof.cosim import ghdl
 from fluxproof.cosim.entity import read_entity
 from fluxproof.cosim.flat import flat_top
 from fluxproof.files import write_text
+from fluxproof.hil.registers import PORTS, code
 from golden_model import drive as drives
 from golden_model.motor import motor_model
-from studies.hil.closed_loop import Parts, golden_run, parts, references
+from studies.hil.closed_loop import BUS, Parts, golden_run, parts, references
+from studies.hil.drive import SERVO
+from studies.hil.figure import least, most
 
-HALF = 1500  # clocks of half a period
+PERIODS, HALF = 300, 200
+FREE = 1500  # clocks of half a period from which on the shaft is free
+HELD_RAD_S = 150.0
 BENCH, RESET = "loop_bench", 4
 FOLDER = BUILD / "hil_ghdl"
 _RUN = """  process
@@ -55,8 +64,7 @@ def bench_text(of: Parts, flat_file) -> str:
         "enable": 1,
         "motor_u_dc": of.scale.u_dc(of.drive.inverter.dc_bus_v),
     }
-    own = {**of.motor._asdict(), **of.sensors._asdict(), **of.bus._asdict()}
-    values |= {f"motor_{name}": value for name, value in own.items()}
+    values |= of.of_motor()
     lines = ["library ieee;", "use ieee.std_logic_1164.all;", "use ieee.numeric_std.all;"]
     lines += [
         "use work.fluxproof_pkg.all;",
@@ -85,32 +93,73 @@ def _start(name: str) -> str:
     return {"clk": " := '0'", "rst": " := '1'"}.get(name, "")
 
 
+def _children_s() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def in_ghdl(of: Parts, clocks: int) -> tuple[np.ndarray, float]:
     """(Gate words after each clock from the end of the reset on, processor time of GHDL [s])."""
     _, (flat_file,) = flat_top("core_and_motor")
     bench = write_text(FOLDER / f"{BENCH}.vhd", bench_text(of, flat_file))
     built = ghdl.build(BENCH, extra=[bench, flat_file])
-    began = time.monotonic()
+    began = _children_s()
     command = ["ghdl", "-r", "--std=08", "--work=top", f"--workdir={built}", BENCH, f"-gCLOCKS={clocks}"]
     program = built / BENCH  # which `ghdl -r` starts in its folder; mcode makes none
     if program.exists():
         command = [str(program), f"-gCLOCKS={clocks}"]
     subprocess.run([*command, "--ieee-asserts=disable"], cwd=FOLDER, check=True)
-    return np.loadtxt(FOLDER / "gates.txt", dtype=np.int64), time.monotonic() - began
+    return np.loadtxt(FOLDER / "gates.txt", dtype=np.int64), _children_s() - began
 
 
-def compare(periods: int) -> tuple[np.ndarray, np.ndarray, int]:
-    """(Gate words of the models, of GHDL; the last speed) of the same closed loop."""
-    drive = drives.with_carrier(drives.load(DRIVES / "servo_24v.toml"), HALF)
-    of = parts(drive)._replace(tables=motor_model.no_tables())
+def of_half(half: int) -> Parts:
+    """What is built in, for a period of 2*half clocks."""
+    drive = drives.with_carrier(drives.load(DRIVES / "servo_24v.toml"), half)
+    if half >= FREE:
+        return parts(drive)._replace(tables=motor_model.no_tables())
+    of = parts(drive, replace(SERVO, inertia_kgm2=1.0), BUS._replace(capacitance=1e-3, source_ohm=0.0))
+    speed = code("omega_set", HELD_RAD_S * of.scale.step_s / (2.0 * math.pi), PORTS["omega_set"].fmt)
+    return of._replace(tables=motor_model.no_tables(), motor=of.motor._replace(hold=1, omega_set=speed))
+
+
+class Compared(NamedTuple):
+    """Gate words of the models and of GHDL; the last speed; processor time of GHDL [s]."""
+
+    models: np.ndarray
+    found: np.ndarray
+    speed: int
+    seconds: float
+
+    @property
+    def wrong(self) -> np.ndarray:
+        """Clocks at which they differ."""
+        return np.flatnonzero(self.models != self.found)
+
+
+def compare(periods: int, half: int = HALF) -> Compared:
+    """The same closed loop twice."""
+    of = of_half(half)
     golden = golden_run(of, periods, 1 << 40)
     words, seconds = in_ghdl(of, len(golden.words))
-    print(f"{periods} periods, {len(words)} clocks in {seconds:.0f} s")
-    return golden.words, words, golden.observed[-1]["omega_me"]
+    return Compared(golden.words, words, golden.observed[-1]["omega_me"], seconds)
+
+
+def figures(_options) -> list[dict]:
+    done = compare(PERIODS)
+    return [
+        least("closed loop of core and motor in GHDL, gates at every clock", PERIODS, PERIODS, "periods"),
+        most("its differences from the golden models in GHDL", len(done.wrong), 0, "clocks"),
+    ]
+
+
+def main(periods: int = PERIODS, half: int = HALF) -> int:
+    """Exit status 1 where a clock differs."""
+    done = compare(periods, half)
+    first = f", the first {done.wrong[0]}" if len(done.wrong) else ""
+    print(f"{periods} periods, {len(done.found)} clocks in {done.seconds:.0f} s of processor time")
+    print(f"speed {done.speed}; {len(done.wrong)} clocks differ{first}")
+    return 1 if len(done.wrong) else 0
 
 
 if __name__ == "__main__":
-    models, found, speed = compare(int(sys.argv[1]) if len(sys.argv) > 1 else 300)
-    wrong = np.flatnonzero(models != found)
-    print(f"speed {speed}; {len(wrong)} clocks differ" + (f", the first {wrong[0]}" if len(wrong) else ""))
-    sys.exit(1 if len(wrong) else 0)
+    sys.exit(main(*map(int, sys.argv[1:])))
