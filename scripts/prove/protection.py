@@ -7,6 +7,7 @@ from scripts.prove.proof import Fault, Proof, committed
 
 LATCH = "io/fault_latch.vhd"
 GUARD = "io/sample_guard.vhd"
+STILL = "io/still_check.vhd"
 
 
 def proof(name: str, says: str, entity: str, macros: tuple[str, ...], *faults: Fault, **more) -> Proof:
@@ -66,5 +67,21 @@ PROOFS = (
         Fault("age does not count", GUARD, "if expired = '0' then", "if busy = '1' then"),
         generics={"INTERVAL": 12},
         assumed="watchdog below 40 and constant, INTERVAL 12",
+    ),
+    Proof(
+        name="protection_still",
+        says="stands needs switching gates and three samples since a restart; none that moved by 2 still_turn does",
+        entity="still_check",
+        harness=committed("still_check.sv"),
+        faults=(
+            Fault("without switching gates", STILL, "if off_6 = '0' or run = '0' then", "if off_6 = '0' then"),
+            Fault("although it is off", STILL, "still_turn /= 0 and unsigned", "unsigned"),
+            Fault("a code that moves still owes", STILL, "        if moved_2 = '1' then\n          state.owed",
+                  "        if begins_1 = '1' then\n          state.owed"),
+            Fault("speed that jumps", STILL, "within(change_2, slow_turn, 0)", "change_2"),
+        ),
+        depth=34,
+        search_depth=50,
+        assumed="a sample every eight clocks, no reset later, constant registers",
     ),
 )  # fmt: skip
