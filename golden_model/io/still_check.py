@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Whether the position code stands although the shaft cannot have stopped: a frozen sensor, or a shaft that jammed.
 
-    turned = code(k) - code(k-1)
-    v(k)   = v(k-1) + (turned - v(k-1), at most slow_turn either way)    speed that changes no faster than a shaft can
-    moved  = |code - anchor| >= still_turn                               then anchor = code, owed = 0, else owed += v
-    stands = |owed| >= 2*still_turn + 4*slow_turn, gates on              code that should have come since, and did not
+    turned = code(k) - code(k-1);  least = the one of turned and mean nearer to zero;  mean += (turned - mean)/4
+    v(k)   = v(k-1) + (least - v(k-1), at most slow_turn either way)     speed that changes no faster than a shaft can
+    moved  = |code - anchor| >= still_turn                               then anchor = code
+    owed   = 0 if moved or v turns against it, else owed + v             code that should have come since, and did not
+    stands = |owed| >= 3*still_turn + 2*slow_turn, gates on
 
 ``slow_turn`` is the largest deceleration, so v is the least speed that a shaft has that was braked since the code moved
-last, and owed the least angle.  A stop, a reversal and a shaft at rest brake no harder: nothing is owed.  Noise of the
-code moves v by slow_turn a sample at most.  Which of the two it is, emf_check decides: a jammed shaft has no EMF.
+last, and owed the least angle.  A stop, a reversal and a shaft at rest brake no harder: nothing is owed.  Less than a
+code a sample is a speed by the mean; a stop shows at once; noise of the code moves v by slow_turn a sample at most.
+Whether the sensor is frozen or the shaft jammed, emf_check decides: a jammed shaft has no EMF.
 ``omega_was`` is |omega_me| of the sample in which the code moved last.  ``stands`` ends when the code moves, and after
 1,022 samples.  ``still_turn`` = 0: off.  After a reset and with ``position_restart`` speed and anchor begin anew.
 
 Formats: codes in 2**-18 turn, v and owed in 2**-26 turn, a difference is the shorter angle.  |x| is the one's
-complement where x is negative.  Nothing is rounded; owed saturates at two turns, the count of samples at 1,023.
+complement where x is negative.  mean is cut (floor); owed saturates at two turns, the count of samples at 1,023.
 """
 
 from typing import NamedTuple
@@ -31,6 +33,8 @@ SPEED_MAX = Format(0, 1, 16)  # |omega_me|
 SHIFT = SLOW.frac_bits - TURN_W
 OWED_W = SLOW.frac_bits + 2
 AGE = Format(0, 10, 0)
+MEAN = 2  # 2**MEAN samples
+STILL_TIMES, SLOW_TIMES = 3, 2
 AGE_HI = AGE.hi
 
 
@@ -38,6 +42,7 @@ class State(NamedTuple):
     seen: int = 0  # 1: a code since the reset
     code: int = 0  # of the last sample, in 2**-18 turn
     anchor: int = 0  # where the code moved last
+    mean: int = 0  # of what the code turned by, 2**-26 turn a sample
     v: int = 0  # 2**-26 turn a sample
     owed: int = 0  # 2**-26 turn
     was: int = 0
@@ -51,13 +56,16 @@ def step(state, code_theta, omega_me, run, position_restart, still_turn, slow_tu
     begins = not s.seen or position_restart
     turned = wrap_s(code - s.code, TURN_W) << SHIFT
     moved = begins or reaches(wrap_s(code - s.anchor, TURN_W), still_turn)
-    v = 0 if begins else s.v + clamp(turned - s.v, -slow_turn, slow_turn)
-    owed = 0 if moved else saturate(s.owed + v, OWED_W)
-    off = still_turn != 0 and reaches(owed, (still_turn << (SHIFT + 1)) + (slow_turn << 2))
+    mean = 0 if begins else s.mean + ((turned - s.mean) >> MEAN)
+    least = min(turned, s.mean) if s.mean >= 0 else max(turned, s.mean)
+    v = 0 if begins else s.v + clamp(least - s.v, -slow_turn, slow_turn)
+    back = (s.owed > 0 and v < 0) or (s.owed < 0 and v > 0)
+    owed = 0 if moved or back else saturate(s.owed + v, OWED_W)
+    off = still_turn != 0 and reaches(owed, (STILL_TIMES * still_turn << SHIFT) + SLOW_TIMES * slow_turn)
     age = min(s.age + 1, AGE_HI) if off and run else 0
     size = omega_me if omega_me >= 0 else -1 - omega_me
     was = size if moved else s.was
-    following = State(1, code, code if moved else s.anchor, v, owed, was, age)
+    following = State(1, code, code if moved else s.anchor, mean, v, owed, was, age)
     return following, (1 if 0 < age < AGE_HI else 0, was)
 
 
@@ -135,9 +143,15 @@ BLOCK = Block(
         Port("omega_was", SPEED_MAX, doc="size of the electrical speed when the code moved last"),
     ),
     state=State(),
-    latency=7,
-    interval=7,
-    constants={"SHIFT": SHIFT, "OWED_W": OWED_W},
+    latency=8,
+    interval=8,
+    constants={
+        "SHIFT": SHIFT,
+        "OWED_W": OWED_W,
+        "MEAN": MEAN,
+        "STILL_TIMES": STILL_TIMES,
+        "SLOW_TIMES": SLOW_TIMES,
+    },
     configs=({"POSITION_BITS": 16}, {"POSITION_BITS": 12}, {"POSITION_BITS": 18}),
     width_from={"code_theta": code_format},
     reference=None,

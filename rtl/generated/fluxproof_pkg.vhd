@@ -1349,9 +1349,12 @@ package fluxproof_pkg is
   constant SPEED_DROP_STATE : natural := 4;
 
   -- still_check: none: protection and diagnosis of the drive
-  constant STILL_CHECK_LATENCY : positive := 7;
+  constant STILL_CHECK_LATENCY : positive := 8;
   constant STILL_CHECK_SHIFT : natural := 8;
   constant STILL_CHECK_OWED_W : natural := 28;
+  constant STILL_CHECK_MEAN : natural := 2;
+  constant STILL_CHECK_STILL_TIMES : natural := 3;
+  constant STILL_CHECK_SLOW_TIMES : natural := 2;
 
   -- telemetry: none: recording of samples
   constant TELEMETRY_LATENCY : positive := 1;

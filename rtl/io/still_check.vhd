@@ -1,13 +1,15 @@
 -- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: whether the position code stands although the shaft cannot have stopped: a frozen sensor, or a jammed shaft.
---   turned = code(k) - code(k-1);  v(k) = v(k-1) + (turned - v(k-1), at most slow_turn either way)
---   moved  = |code - anchor| >= still_turn: then anchor = code and owed = 0, else owed = owed + v
---   stands = |owed| >= 2*still_turn + 4*slow_turn with gates on, for 1,022 samples at most; still_turn = 0: off
+--   turned = code(k) - code(k-1);  least = the one of turned and mean nearer to zero;  mean += (turned - mean)/4
+--   v(k)   = v(k-1) + (least - v(k-1), at most slow_turn either way)
+--   moved  = |code - anchor| >= still_turn: then anchor = code
+--   owed   = 0 if moved or v turns against it, else owed + v
+--   stands = |owed| >= 3*still_turn + 2*slow_turn with gates on, for 1,022 samples at most; still_turn = 0: off
 -- v is the least speed of a shaft that was braked by slow_turn since its code moved last, owed its least angle.
 -- omega_was = |omega_me| of the sample in which the code moved last.  After a reset and with position_restart all
 -- begins anew.
--- Formats: codes in 2**-18 turn, v and owed in 2**-26 turn.  Latency: 7.  Interval: 7.
--- Rounding: none; |x| is the one's complement where x is negative; owed saturates at two turns, the samples at 1,023.
+-- Formats: codes in 2**-18 turn, v and owed in 2**-26 turn.  Latency: 8.  Interval: 8.
+-- Rounding: mean is cut (floor); |x| is the one's complement where x is negative; owed saturates at two turns, the samples at 1,023.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -45,6 +47,7 @@ architecture rtl of still_check is
     seen   : std_logic;
     code   : unsigned(TURN_W - 1 downto 0);
     anchor : unsigned(TURN_W - 1 downto 0);
+    mean   : signed(V_W - 1 downto 0);
     v      : signed(V_W - 1 downto 0);
     owed   : signed(OWED_W - 1 downto 0);
     was    : unsigned(PU_W - 2 downto 0);
@@ -52,7 +55,7 @@ architecture rtl of still_check is
   end record state_t;
 
   constant EMPTY : state_t := ('0', (others => '0'), (others => '0'), (others => '0'), (others => '0'),
-                               (others => '0'), (others => '0'));
+                               (others => '0'), (others => '0'), (others => '0'));
 
   signal state : state_t;
 
@@ -61,14 +64,22 @@ architecture rtl of still_check is
   signal begins_1 : std_logic;
   signal turned_1 : signed(TURN_W - 1 downto 0);
   signal away_1   : signed(TURN_W - 1 downto 0);
-  signal change_2 : signed(V_W downto 0);
+  signal scaled_1 : signed(V_W - 1 downto 0);
+  signal least_2  : signed(V_W - 1 downto 0);
   signal moved_2  : std_logic;
   signal change_3 : signed(V_W downto 0);
-  signal limit_4  : unsigned(OWED_W - 2 downto 0);
-  signal off_6    : std_logic;
+  signal change_4 : signed(V_W downto 0);
+  signal limit_5  : unsigned(OWED_W - 2 downto 0);
+  signal back_5   : std_logic;
+  signal off_7    : std_logic;
+
+  constant STILL_TIMES : positive := STILL_CHECK_STILL_TIMES;
+  constant SLOW_TIMES  : positive := STILL_CHECK_SLOW_TIMES;
 begin
   valid(0) <= in_valid;
   code_0   <= shift_left(resize(code_theta, TURN_W), TURN_W - POSITION_BITS);
+  scaled_1 <= shift_left(resize(turned_1, V_W), SHIFT);
+  back_5   <= '1' when (state.owed > 0 and state.v < 0) or (state.owed < 0 and state.v > 0) else '0';
 
   process (clk)
   begin
@@ -84,48 +95,61 @@ begin
         state.code <= code_0;
       end if;
 
-      -- Stage 2: change = turned - v;  moved
+      -- Stage 2: least = turned or mean, the nearer to zero;  mean;  moved
       if valid(1) = '1' then
-        change_2 <= shift_left(resize(turned_1, V_W + 1), SHIFT) - state.v;
-        moved_2  <= '1' when begins_1 = '1' or unsigned(size(away_1)) >= still_turn else '0';
+        least_2 <= scaled_1;
+        if (state.mean >= 0 and scaled_1 > state.mean) or (state.mean < 0 and scaled_1 < state.mean) then
+          least_2 <= state.mean;
+        end if;
+        state.mean <= state.mean + resize(shift_right(resize(scaled_1, V_W + 1) - state.mean, STILL_CHECK_MEAN), V_W);
+        if begins_1 = '1' then
+          state.mean <= (others => '0');
+        end if;
+        moved_2 <= '1' when begins_1 = '1' or unsigned(size(away_1)) >= still_turn else '0';
       end if;
 
-      -- Stage 3: change, at most slow_turn;  what the code moved to
+      -- Stage 3: change = least - v;  what the code moved to
       if valid(2) = '1' then
-        change_3 <= within(change_2, slow_turn, 0);
+        change_3 <= resize(least_2, V_W + 1) - state.v;
         if moved_2 = '1' then
           state.anchor <= state.code;
           state.was    <= unsigned(omega_me(PU_W - 2 downto 0) xor omega_me(PU_W - 1));
         end if;
       end if;
 
-      -- Stage 4: v = v + change;  limit = 2*still_turn + 4*slow_turn
+      -- Stage 4: change, at most slow_turn
       if valid(3) = '1' then
-        state.v <= resize(state.v + change_3, V_W);
+        change_4 <= within(change_3, slow_turn, 0);
+      end if;
+
+      -- Stage 5: v = v + change;  limit = 3*still_turn + 2*slow_turn
+      if valid(4) = '1' then
+        state.v <= resize(state.v + change_4, V_W);
         if begins_1 = '1' then
           state.v <= (others => '0');
         end if;
-        limit_4 <= shift_left(resize(still_turn, OWED_W - 1), SHIFT + 1) + shift_left(resize(slow_turn, OWED_W - 1), 2);
+        limit_5 <= resize(STILL_TIMES * shift_left(resize(still_turn, OWED_W - 1), SHIFT), OWED_W - 1)
+                   + resize(SLOW_TIMES * resize(slow_turn, OWED_W - 1), OWED_W - 1);
       end if;
 
-      -- Stage 5: owed = owed + v
-      if valid(4) = '1' then
+      -- Stage 6: owed = owed + v
+      if valid(5) = '1' then
         state.owed <= saturate(resize(state.owed, OWED_W + 1) + state.v, OWED_W);
-        if moved_2 = '1' then
+        if (moved_2 or back_5) = '1' then
           state.owed <= (others => '0');
         end if;
       end if;
 
-      -- Stage 6: off = |owed| >= limit
-      if valid(5) = '1' then
-        off_6 <= '1' when still_turn /= 0 and unsigned(size(state.owed)) >= limit_4 else '0';
+      -- Stage 7: off = |owed| >= limit
+      if valid(6) = '1' then
+        off_7 <= '1' when still_turn /= 0 and unsigned(size(state.owed)) >= limit_5 else '0';
       end if;
 
-      -- Stage 7: age = samples since then;  the verdict
-      if valid(6) = '1' then
+      -- Stage 8: age = samples since then;  the verdict
+      if valid(7) = '1' then
         stands    <= '0';
         omega_was <= state.was;
-        if off_6 = '0' or run = '0' then
+        if off_7 = '0' or run = '0' then
           state.age <= (others => '0');
         elsif (and state.age) = '0' then
           state.age <= state.age + 1;
