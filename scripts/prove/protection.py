@@ -7,6 +7,7 @@ from scripts.prove.proof import Fault, Proof, committed
 
 LATCH = "io/fault_latch.vhd"
 GUARD = "io/sample_guard.vhd"
+STILL = "io/still_check.vhd"
 
 
 def proof(name: str, says: str, entity: str, macros: tuple[str, ...], *faults: Fault, **more) -> Proof:
@@ -66,5 +67,21 @@ PROOFS = (
         Fault("age does not count", GUARD, "if expired = '0' then", "if busy = '1' then"),
         generics={"INTERVAL": 12},
         assumed="watchdog below 40 and constant, INTERVAL 12",
+    ),
+    Proof(
+        name="protection_still",
+        says="no code stands that began anew or moved by 2 still_turn, without switching gates, or with still_turn 0",
+        entity="still_check",
+        harness=committed("still_check.sv"),
+        faults=(
+            Fault("without switching gates", STILL, "if off_7 = '0' or run = '0' then", "if off_7 = '0' then"),
+            Fault("although it is off", STILL, "still_turn /= 0 and unsigned", "unsigned"),
+            Fault("a code that moves still owes", STILL, "        if (moved_2 or back_5) = '1' then",
+                  "        if (begins_1 or back_5) = '1' then"),
+        ),
+        depth=28,
+        free=("least_2", "change_4"),
+        search_depth=60,
+        assumed="a sample every nine clocks, no reset later, constant registers; any speeds",
     ),
 )  # fmt: skip
