@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from fluxproof.checkout import DRIVES
+from fluxproof.diagnosis.report import theme
 from fluxproof.simulate import scene, verdict
+from fluxproof.simulate.pictures import circles
 from fluxproof.simulate.speed_range import speed_range
 from fluxproof.simulate.trip import beyond, of_trip, top_speed, trip, unjudged
 from golden_model.drive import load
@@ -50,6 +52,25 @@ def test_torque_over_speed_is_that_of_the_equations():
     assert found.reach(found.without) == pytest.approx(scene.reach(drive, 0.0), abs=2.0 * found.speed[1])
     assert found.reach(found.with_table) == FAST
     assert np.hypot(*found.points.T).max() <= drive.current_limit_a * (1.0 + 1e-9)
+
+
+def test_the_title_of_the_circles_is_beside_their_key(monkeypatch):
+    """Equal scales make these axes narrow: title and key had shared a line."""
+    drawn = []
+    monkeypatch.setattr(theme, "picture", lambda _name, figure, _caption: drawn.append(figure))
+    circles(SPINDLE, speed_range(SPINDLE, FAST))
+    (figure,) = drawn
+    figure.draw_without_rendering()
+    (axis,) = figure.axes
+    title, boxes = axis.title.get_window_extent(), [text.get_window_extent() for text in axis.texts]
+    assert len(boxes) == 2 and not any(title.overlaps(box) for box in boxes)
+
+
+def test_reserve_for_a_bus_step_lowers_the_curve_above_base_speed_alone():
+    free, kept = (speed_range(replaced(control={"bus_step_reserve": part}), FAST).with_table for part in (0.0, 0.16))
+    rated = int(np.flatnonzero(free < 0.97 * free[0])[0])
+    assert kept[: rated // 2] == pytest.approx(free[: rated // 2])
+    assert (kept[rated:] < 0.99 * free[rated:]).all()
 
 
 def test_a_trip_above_base_speed_charges_the_capacitor():

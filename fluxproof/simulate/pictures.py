@@ -145,7 +145,8 @@ def circles(drive: Drive, reached: SpeedRange) -> theme.Picture:
         axis.plot(*reached.ellipse(speed), color=theme.RECORDED, linewidth=0.9)
     axis.plot(*reached.mtpa.T, color=theme.BEFORE)
     axis.plot(*reached.points.T, ".-", color=theme.AFTER, markersize=3)
-    axis.set(title="Both circles", xlabel="$i_d$ [A]", ylabel="$i_q$ [A]", xlim=(-1.6 * limit, 1.1 * limit))
+    axis.set_title("Both circles", pad=18.0)  # above the key: equal scales make the axes narrow
+    axis.set(xlabel="$i_d$ [A]", ylabel="$i_q$ [A]", xlim=(-1.6 * limit, 1.1 * limit))
     axis.set(ylim=(-0.15 * limit, 1.15 * limit), aspect="equal")
     theme.key(axis, ("least current", theme.BEFORE), ("largest torque over speed", theme.AFTER))
     at = " and ".join(f"{speed / RPM:.4g} rpm" for speed in speeds)

@@ -220,6 +220,7 @@ def hostile(case: Case, plane: torque_table.Plane, step_s: float, demands: int =
     asked = np.repeat(rng.uniform(-2.5, 2.5, demands) * top, hold)
     wanted = np.repeat(rng.uniform(0.1, 3.0, -(-demands // 20)), 20 * hold)[: len(asked)] * base
     speed = np.copy(wanted)
+    speed[0] = min(speed[0], 0.5 * base)  # currents of zero and an EMF above the bus: the diodes would not allow it
     for k in range(1, len(speed)):  # the load machine moves it by one base speed in 50 ms at most
         speed[k] = speed[k - 1] + np.clip(wanted[k] - speed[k - 1], -base * t_s / 0.05, base * t_s / 0.05)
     levels = np.abs(np.cumsum(rng.choice((-1, 1), -(-demands // 5))) % 4 - 2) - 1  # -1, 0, 1: one step at a time
