@@ -262,8 +262,9 @@ def _protection(drive):
         _refuse("[protection] u_dc_max_v", p.u_dc_max_v, allowed)
     if p.brake_off_v is not None and (p.brake_on_v is None or not p.brake_off_v < p.brake_on_v):
         _refuse("[protection] brake_off_v", p.brake_off_v, f"below brake_on_v = {p.brake_on_v or 0.0:g} V")
-    if p.brake_on_v is not None and not bus < p.brake_on_v <= reach:
-        allowed = f"above [inverter] dc_bus_v = {bus:g} V, up to [sensors] u_dc_range_v = {reach:g} V"
+    most = p.u_dc_max_v or default_u_dc_max_v(drive)
+    if p.brake_on_v is not None and not bus < p.brake_on_v < most:
+        allowed = f"above [inverter] dc_bus_v = {bus:g} V and below u_dc_max_v = {most:g} V, which trips"
         _refuse("[protection] brake_on_v", p.brake_on_v, allowed)
     if p.overspeed_rad_s is not None and not p.overspeed_rad_s > drive.machine.rated_speed_rad_s:
         _refuse("[protection] overspeed_rad_s", p.overspeed_rad_s, "above [machine] rated_speed_rad_s")
