@@ -255,6 +255,7 @@ def test_protection_keys(tmp_path):
     ("regen_start_v = 500", r"regen_start_v = 500 is .* above \[inverter\] dc_bus_v = 563 V and below"),
     ("brake_on_v = 600\nregen_start_v = 590", r"regen_start_v = 590 is .* above brake_on_v = 600 V"),
     ("regen_start_v = 600\nregen_end_v = 740", r"regen_end_v = 740 .* above regen_start_v = 600 V"),
+    ("brake_on_v = 735", r"brake_on_v = 735 is out of range: .* below u_dc_max_v = 731.9 V, which trips"),
     ("regen_end_v = 600", r"regen_end_v needs regen_start_v"),
     ("u_dc_max_v = 500", r"u_dc_max_v = 500 is out of range: allowed is above \[inverter\] dc_bus_v"),
     ("watchdog_periods = 1", "watchdog_periods = 1 is out of range: allowed is above 1; trip_watchdog = false"),

@@ -57,6 +57,10 @@ REPEATED = 2.0  # what the equation leaves is its own error rather than noise, a
 GRID = TURN_RAD / 720 * np.arange(720)  # phi, to find the harmonics of the signs
 
 
+class TurnedTooFar(Refusal):
+    """The rotor did not stand in the rotating field."""
+
+
 class Point:
     """The harmonics of one run: current and voltage at the frequency w [rad/s]."""
 
@@ -108,25 +112,35 @@ def frequency(session: Session, current: float, volts_per_a: float) -> float:
 
 
 def measure(session: Session, volts_per_a: float) -> Step:
-    """R, L_d, L_q, V_dead; the drive then has the first three."""
-    s = session
+    """R, L_d, L_q, V_dead; the drive then has the first three.
+
+    With smaller amplitudes where the voltage does not suffice for the largest, or where the rotor follows them too far.
+    """
+    s, refused = session, None
     for size in SMALLER:
         largest = size * PARTS[-1] * s.limit
         high = frequency(s, largest, volts_per_a)
-        if high >= LEAST_HZ:
-            break
-    else:
-        raise Refusal(
-            f"too little voltage: {s.voltage():.3g} V do not drive {largest:.3g} A at {LEAST_HZ:.0f} Hz, the winding "
-            f"took {volts_per_a:.3g} V/A at standstill; check bus, [machine] inductance_d_h, [control] current_limit_a"
-        )
+        if high < LEAST_HZ:
+            continue
+        try:
+            return judge(s, _points(s, size, high))
+        except TurnedTooFar as turned:
+            refused = turned
+    raise refused or Refusal(
+        f"too little voltage: {s.voltage():.3g} V do not drive {largest:.3g} A at {LEAST_HZ:.0f} Hz, the winding "
+        f"took {volts_per_a:.3g} V/A at standstill; check bus, [machine] inductance_d_h, [control] current_limit_a"
+    )
+
+
+def _points(s: Session, size: float, high: float) -> list[Point]:
+    """All amplitudes, times ``size``, in both senses at the higher frequency [Hz], the largest at the lower one too."""
     plan = [(size * part, sign * high) for part in PARTS for sign in (1.0, -1.0)]
     plan += [(size * PARTS[-1], sign * LOWER * high) for sign in (1.0, -1.0)]
     points = []
     for k, (part, hertz) in enumerate(plan):
         s.progress(f"winding, {part * s.limit:.3g} A at {hertz:.0f} Hz ({k + 1} of {len(plan)})")
         points.append(_run(s, part * s.limit, TURN_RAD * hertz))
-    return judge(s, points)
+    return points
 
 
 def _run(s: Session, current: float, w: float) -> Point:
@@ -155,9 +169,10 @@ def _run(s: Session, current: float, w: float) -> Point:
     rotor = (-1.0 if sensors.position_reverse else 1.0) * pairs * TURN_RAD * seen.code + sensors.theta_offset_rad
     line = np.polyval(np.polyfit(seen.t, rotor, 1), seen.t)
     if math.degrees(np.ptp(line)) > STOOD_DEG:
-        raise Refusal(
+        raise TurnedTooFar(
             f"the rotor turned by {math.degrees(np.ptp(line)):.0f} degrees in a field of {w / TURN_RAD:.0f} Hz, "
-            f"expected {STOOD_DEG:.0f} at most: something drives the shaft, or the inertia is too small"
+            f"expected {STOOD_DEG:.0f} at most: something drives the shaft, or the inertia is too small: "
+            "hold or load it, or commission with a smaller [control] current_limit_a"
         )
     return Point(seen, line, w, s.t_s, current)
 

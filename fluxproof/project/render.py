@@ -38,6 +38,8 @@ class Project(NamedTuple):
 def generics(drive: Drive, register_set: RegisterSet, hil: bool = False) -> dict[str, int]:
     """The generics of the top, by their names in the VHDL."""
     chosen = board_generics(drive) if has_board(drive) or hil else {}
+    if hil:
+        chosen = {**chosen, "temperatures": 1}
     named = register_set.config._asdict() | pin_generics(drive) | chosen
     return {"CLOCK_HZ": round(drive.core.clock_hz), **{name.upper(): value for name, value in named.items()}}
 
