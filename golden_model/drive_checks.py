@@ -146,7 +146,8 @@ def _samples_per_turn(drive):
     if drive.base_choice.omega_me_rad_s is not None:
         keys = f"[bases] omega_me_rad_s = {w:g}"
     pwm = TURN_SAMPLES * w / (2.0 * math.pi) / drive.core.updates_per_period
-    twice = " or [core] updates_per_period = 2" if drive.core.updates_per_period == 1 else ""
+    enough = drive.core.updates_per_period == 1 and 2.0 * samples > TURN_SAMPLES
+    twice = " or [core] updates_per_period = 2" if enough else ""
     keys = f"{keys} with [inverter] pwm_frequency_hz = {drive.inverter.pwm_frequency_hz:g}"
     raise DriveError(
         f"{keys} make {samples:.4g} samples in an electrical turn: allowed is above {TURN_SAMPLES:.4g}, "

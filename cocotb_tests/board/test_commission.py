@@ -396,3 +396,23 @@ def test_figures_of_100_motors(figure):
         figure(*(row[key] for key in ("figure", "ours", "target", "unit", "pass")))
     accepted, *others = rows  # a sound motor that is refused is a figure missed, a wrong result is a failure
     assert accepted["ours"] >= 90 and all(row["pass"] for row in others), [row for row in rows if not row["pass"]]
+
+
+def test_a_rotor_that_follows_the_field_gets_a_smaller_current(monkeypatch):
+    """The winding is measured with the first amplitude under which the rotor stands; refused if there is none."""
+    tried, stands_at = [], [0.7]
+
+    def points(_session, size, _hertz):
+        tried.append(size)
+        if size > stands_at[0]:
+            raise winding.TurnedTooFar("the rotor turned by 32 degrees")
+        return size
+
+    monkeypatch.setattr(winding, "_points", points)
+    monkeypatch.setattr(winding, "frequency", lambda *_: 100.0)
+    monkeypatch.setattr(winding, "judge", lambda _session, size: size)
+    session = SimpleNamespace(limit=9.0)
+    assert winding.measure(session, 1.0) == 0.7 and tried == [1.0, 0.7]
+    stands_at[0] = 0.0
+    with pytest.raises(winding.TurnedTooFar, match="32 degrees"):
+        winding.measure(session, 1.0)

@@ -84,6 +84,7 @@ WRONG = {  # section, line, what the message must contain besides the file's nam
         "above 12.57",
         "above 16000 Hz or [core] updates_per_period = 2",
     ),
+    "too few for two updates": ("machine", "rated_speed_rad_s = 4e3", "make 3.927 samples", "above 32000 Hz\n"),
     "slow clock": ("core", "clock_hz = 1e5", "[core] clock_hz", "8 to 32767"),
     "tiny pwm": ("core", "clock_hz = 1e12", "[core] clock_hz", "8 to 32767"),
     "dead time": ("inverter", "dead_time_s = 3e-6", "[inverter] dead_time_s", "below min_pulse_s = 3e-06 s"),
