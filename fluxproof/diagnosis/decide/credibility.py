@@ -16,9 +16,6 @@ import numpy as np
 
 from fluxproof.diagnosis.ground import constants as k
 
-MEDIAN = 0.6745  # of the magnitude of normal noise, in standard deviations
-WHOLE = 1e-6  # distance from a whole electrical order
-
 
 def credibilities(fit) -> dict[str, float]:
     """{effect of a fit: probability in (0, 1] that it is real and not an artefact of the unexplained residual}."""
@@ -45,10 +42,10 @@ def _credibility(fit, name, powers, sure: Collection[str] = frozenset()) -> floa
     for channel, contrast in sorted({(channel, contrast) for channel, _, contrast in p.groups}):
         mine = np.array([(c, x) == (channel, contrast) for c, _, x in p.groups])
         total = power[mine].sum()
-        if total <= 0.0 or _is_an_unknown_load(fit, name, channel):
+        if total <= 0.0:
             continue
         own = mine & (power >= k.LIVES * total)
-        away = beside[_not_between_orders(mine, own, p.groups) & ~own].sum()
+        away = beside[mine & ~own].sum()
         away += _changes_between_visits(left, own, contrast, p.groups)
         remains = left[own].sum() + _weight_elsewhere(channel) * away
         strength = total / level2[mine].mean()
@@ -63,21 +60,8 @@ def _beyond_the_usual_error(fit) -> np.ndarray:
     Without it nothing would be credible in a long recording of a healthy drive's size; errors of curves count as they
     are, as a loss at currents within their ripple is wrong by any amount.
     """
-    p, lam = fit.problem.p, _seen_discrepancy(fit)
+    p, lam = fit.problem.p, fit.lam
     return np.where(lam > k.USUAL, lam**2 - 1.0, 0.0) * _power(p, p.level) + fit.mu**2 * _power(p, p.doubt)
-
-
-def _seen_discrepancy(fit) -> np.ndarray:
-    """Discrepancy of every group in units of the level: where a load hides it, that of half of the points, at most.
-
-    A friction of 0.8 N m on a free shaft, with 0.03 N m left at all but one loaded point, was not credible.
-    """
-    p, lam = fit.problem.p, fit.lam.copy()
-    mine = p.group == p.loads
-    if mine.any():
-        left = (p.y[mine] - p.x[mine][:, fit.take] @ fit.vector) / p.level[mine]
-        lam[p.loads] = min(lam[p.loads], float(np.median(np.abs(left))) / MEDIAN)
-    return lam
 
 
 def _error_of_surer_effects(fit, name, left, powers, sure) -> np.ndarray:
@@ -91,24 +75,6 @@ def _error_of_surer_effects(fit, name, left, powers, sure) -> np.ndarray:
         return left
     along = _along(fit, name, sure)
     return along * left + (1.0 - along) * _beside(left, [powers[n] for n in sure])
-
-
-def _is_an_unknown_load(fit, name, channel) -> bool:
-    """Whether a channel says nothing: a torque that nobody measured, of an effect that a voltage shows.
-
-    Offsets of the sensors, all that the voltage showed, were only possible (0.21) beside an unknown load of the shaft.
-    """
-    problem = fit.problem
-    return channel == "torque" and problem.setup.load > 0.0 and name in problem.cells.electrical
-
-
-def _not_between_orders(mine, own, groups) -> np.ndarray:
-    """(groups,) bool: those that count for an effect, of ``mine``; what acts at whole orders leaves nothing between.
-
-    A ripple of the shaft, between the orders of the electrical angle, would otherwise withhold a dead time.
-    """
-    whole = np.array([abs(order - round(order)) < WHOLE for _, order, _ in groups])
-    return mine & whole if whole[own].all() else mine
 
 
 def _weight_elsewhere(channel) -> float:
