@@ -70,7 +70,7 @@ PROOFS = (
     ),
     Proof(
         name="protection_still",
-        says="no code stands that began anew or moved by 2 still_turn, without switching gates, or with still_turn 0",
+        says="a code stands only with switching gates and still_turn above 0, not anew, not if it moved with still_turn 1",
         entity="still_check",
         harness=committed("still_check.sv"),
         faults=(
@@ -79,7 +79,7 @@ PROOFS = (
             Fault("a code that moves still owes", STILL, "        if (moved_2 or back_5) = '1' then",
                   "        if (begins_1 or back_5) = '1' then"),
         ),
-        depth=28,
+        method="pdr",
         free=("least_2", "change_4"),
         search_depth=60,
         assumed="a sample every nine clocks, no reset later, constant registers; any speeds",
