@@ -70,7 +70,7 @@ PROOFS = (
     ),
     Proof(
         name="protection_still",
-        says="a code stands only with switching gates and still_turn above 0, not anew, not if it moved with still_turn 1",
+        says="stands needs switching gates and still_turn above 0, no restart, and with still_turn 1 no change",
         entity="still_check",
         harness=committed("still_check.sv"),
         faults=(
