@@ -33,20 +33,9 @@ module formal_top (
     if (n != 0) assume ($stable({code_theta, omega_me, run, position_restart}));
   end
 
-  // turned: between the last two codes
-  reg [15:0] last = 0;
-  reg [15:0] turned = 0;
-  always @(posedge clk)
-    if (n == 0) begin
-      turned <= code_theta - last;
-      last <= code_theta;
-    end
-
   always @(posedge clk) if (begun && out_valid) begin
     // The gates switch, the check is on, and nothing began anew
     if (stands) assert (run && still_turn != 0 && !position_restart);
-    // With still_turn 1 every change of the code is a motion
-    if (stands && still_turn == 1) assert (turned == 0);
     cover (stands);
   end
 endmodule
