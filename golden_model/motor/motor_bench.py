@@ -59,7 +59,9 @@ def step(state, inputs, brake, regs, of_bus, k_filter, of_heat, tables, clocks):
         r.viscous, r.coulomb, r.pole_pairs, r.hold, r.omega_set,
     )  # fmt: skip
     motor, shown = motor_step(state.motor, now, warm, tables, clocks)
-    of_filter, filtered = filter_step(state.filter, shown.i_a, shown.i_b, shown.i_c, k_filter)
+    of_filter, filtered = state.filter, state.filtered
+    if motor.starting == 0:  # before, no currents stand at the outputs
+        of_filter, filtered = filter_step(state.filter, shown.i_a, shown.i_b, shown.i_c, k_filter)
     return State(motor, bus, u_dc, state.u_dc, of_filter, filtered, state.filtered, heat), shown
 
 

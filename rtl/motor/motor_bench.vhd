@@ -104,37 +104,41 @@ entity motor_bench is
 end entity motor_bench;
 
 architecture rtl of motor_bench is
-  signal held      : std_logic;
-  signal tick      : std_logic;
-  signal ticked    : std_logic_vector(1 to 2);
-  signal brake_1   : std_logic;
-  signal starts    : std_logic;
-  signal start_1   : std_logic;
-  signal charge    : signed(MOTOR_CHARGE_W - 1 downto 0);
-  signal u_bus     : signed(MOTOR_VOLTAGE_W - 1 downto 0);
-  signal u_next    : signed(MOTOR_VOLTAGE_W - 1 downto 0);
-  signal hot_a     : unsigned(23 downto 0);
-  signal hot_b     : unsigned(23 downto 0);
-  signal hot_c     : unsigned(23 downto 0);
-  signal hot_psi   : signed(FLUX_W - 1 downto 0);
-  signal y_a       : signed(PU_W - 1 downto 0);
-  signal y_b       : signed(PU_W - 1 downto 0);
-  signal y_c       : signed(PU_W - 1 downto 0);
-  signal i_a_0     : signed(PU_W - 1 downto 0);
-  signal i_b_0     : signed(PU_W - 1 downto 0);
-  signal i_c_0     : signed(PU_W - 1 downto 0);
-  signal i_a_1     : signed(PU_W - 1 downto 0);
-  signal i_b_1     : signed(PU_W - 1 downto 0);
-  signal i_c_1     : signed(PU_W - 1 downto 0);
-  signal u_dc_1    : signed(MOTOR_VOLTAGE_W - 1 downto 0);
-  signal theta_m_1 : unsigned(MOTOR_ANGLE_W - 1 downto 0);
-  signal seen      : unsigned(MOTOR_ANGLE_W - 1 downto 0);
+  signal held       : std_logic;
+  signal tick       : std_logic;
+  signal ticked     : std_logic_vector(1 to 2);
+  signal brake_1    : std_logic;
+  signal starts     : std_logic;
+  signal start_1    : std_logic;
+  signal charge     : signed(MOTOR_CHARGE_W - 1 downto 0);
+  signal u_bus      : signed(MOTOR_VOLTAGE_W - 1 downto 0);
+  signal u_next     : signed(MOTOR_VOLTAGE_W - 1 downto 0);
+  signal hot_a      : unsigned(23 downto 0);
+  signal hot_b      : unsigned(23 downto 0);
+  signal hot_c      : unsigned(23 downto 0);
+  signal hot_psi    : signed(FLUX_W - 1 downto 0);
+  signal filter_rst : std_logic;
+  signal y_a        : signed(PU_W - 1 downto 0);
+  signal y_b        : signed(PU_W - 1 downto 0);
+  signal y_c        : signed(PU_W - 1 downto 0);
+  signal i_a_0      : signed(PU_W - 1 downto 0);
+  signal i_b_0      : signed(PU_W - 1 downto 0);
+  signal i_c_0      : signed(PU_W - 1 downto 0);
+  signal i_a_1      : signed(PU_W - 1 downto 0);
+  signal i_b_1      : signed(PU_W - 1 downto 0);
+  signal i_c_1      : signed(PU_W - 1 downto 0);
+  signal u_dc_1     : signed(MOTOR_VOLTAGE_W - 1 downto 0);
+  signal theta_m_1  : unsigned(MOTOR_ANGLE_W - 1 downto 0);
+  signal seen       : unsigned(MOTOR_ANGLE_W - 1 downto 0);
 begin
   seen         <= motor_theta_m + motor_angle_offset;
   position_now <= seen(MOTOR_ANGLE_W - 1 downto MOTOR_ANGLE_W - POSITION_BITS);
 
   starts <= motor_start or not motor_ready;
   u_next <= motor_u_dc when starts = '1' else u_bus;
+
+  -- Currents from before a reset stay at the outputs until the first step is through
+  filter_rst <= rst or not motor_ready;
 
   -- What the converters see; without a filter the currents at once
   i_a_0 <= motor_i_a when motor_k_filter = 0 else y_a;
@@ -236,7 +240,7 @@ begin
 
   current_filter : entity work.motor_filter
     port map (
-      clk => clk, rst => rst, in_valid => ticked(2), i_a => motor_i_a, i_b => motor_i_b, i_c => motor_i_c,
+      clk => clk, rst => filter_rst, in_valid => ticked(2), i_a => motor_i_a, i_b => motor_i_b, i_c => motor_i_c,
       k_filter => motor_k_filter, out_valid => open, y_a => y_a, y_b => y_b, y_c => y_c
     );
 
