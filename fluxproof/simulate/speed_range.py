@@ -76,8 +76,8 @@ def speed_range(drive: Drive, top: float) -> SpeedRange:
     i_d = np.broadcast_to(plane.i_d[::COARSE, None], i_q.shape)
     lambda_d, lambda_q = linear(m)(i_d, i_q)
     drop, middle = m.resistance_ohm, int(np.abs(i_d[:, 0]).argmin())
-    _, *largest = plane.most(np.inf)
-    flux = float(np.hypot(*linear(m)(*largest)))  # of the table's last row
+    _, most_d, most_q = plane.most(np.inf)
+    flux = float(np.hypot(*linear(m)(np.array(most_d), np.array(most_q))))  # of the table's last row
     speeds = np.linspace(0.0, top, POINTS)
     most, without, points = np.zeros(POINTS), np.zeros(POINTS), np.zeros((POINTS, 2))
     for k, speed in enumerate(speeds):
