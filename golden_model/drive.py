@@ -93,7 +93,6 @@ class Control:
     speed_filter_hz: float | None = positive("Hz", "filter of the measured speed; none: no filter", None)
     current_limit_a: float | None = positive("A", "limit of the current, rated current if none", None)
     voltage_target: float = positive("1", "part of the voltage circle used above base speed", 0.98, most=1.0)
-    bus_step_reserve: float = not_negative("1", "part of current_limit_a kept free above base speed", 0.0, most=0.5)
     weakening_bandwidth_hz: float = positive("Hz", "voltage loop above base speed", 20.0)
     torque_rise_s: float = positive("s", "shortest time from zero to the largest torque, with the torque table", 2e-3)
     mode_change_s: float = positive("s", "shortest time from zero to a limit where a mode begins", 0.02)

@@ -20,7 +20,7 @@ SHARE_MIN = 0.5  # a machine whose flux linkage is twice that of its table is an
 def table_of(drive, flux=None) -> torque_table.TorqueTable:
     """The table of a drive; ``flux``: its flux linkage, see torque_table.measured; else the nameplate's."""
     flux = flux or torque_table.linear(drive.machine)
-    return torque_table.build(flux, drive.machine.pole_pairs, drive.current_limit_a, drive.control.bus_step_reserve)
+    return torque_table.build(flux, drive.machine.pole_pairs, drive.current_limit_a)
 
 
 def references(drive, table):

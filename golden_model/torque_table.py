@@ -136,29 +136,14 @@ class Plane:
         return i_d, least_q
 
 
-def circle_part(reserve: float, part: float) -> float:
-    """The part of the current circle that the table uses at a part of its last row's flux limit.
-
-    Full at the last row, less ``reserve`` from half of it down: what a bus step adds while the drive brakes grows with
-    the speed over the base speed and not beyond twice of it (docs/speed_range.md).
-    """
-    return 1.0 - reserve * min(2.0 * (1.0 - part), 1.0)
-
-
-def build(flux: Flux, pole_pairs: int, i_max: float, reserve: float = 0.0) -> TorqueTable:
-    """The table of a machine; the last row's flux limit is the flux of the largest torque within the circle.
-
-    ``reserve``: part of i_max [A] that the rows below half of the last one's flux limit leave free.
-    """
+def build(flux: Flux, pole_pairs: int, i_max: float) -> TorqueTable:
+    """The table of a machine; the last row's flux limit is the flux of the largest torque within the circle."""
     plane = Plane(flux, pole_pairs, i_max)
     free = plane.most(np.inf)
     d, q = flux(np.array([free[1]]), np.array([free[2]]))
     limits = float(np.hypot(d, q)[0]) * np.arange(ROWS) / (ROWS - 1)
     i_d, i_q, top = np.zeros((ROWS, COLUMNS)), np.zeros((ROWS, COLUMNS)), np.zeros(ROWS)
-    planes = {1.0: plane}
     for row, limit in enumerate(limits):
-        part = circle_part(reserve, row / (ROWS - 1))
-        plane = planes[part] = planes.get(part) or Plane(flux, pole_pairs, part * i_max)
         top[row], end_d, end_q = plane.most(limit * (1.0 + 1e-9))
         for column in range(COLUMNS):
             t = column / (COLUMNS - 1)

@@ -66,13 +66,6 @@ def test_the_title_of_the_circles_is_beside_their_key(monkeypatch):
     assert len(boxes) == 2 and not any(title.overlaps(box) for box in boxes)
 
 
-def test_reserve_for_a_bus_step_lowers_the_curve_above_base_speed_alone():
-    free, kept = (speed_range(replaced(control={"bus_step_reserve": part}), FAST).with_table for part in (0.0, 0.16))
-    rated = int(np.flatnonzero(free < 0.97 * free[0])[0])
-    assert kept[: rated // 2] == pytest.approx(free[: rated // 2])
-    assert (kept[rated:] < 0.99 * free[rated:]).all()
-
-
 def test_a_trip_above_base_speed_charges_the_capacitor():
     """Behind a diode to the rectified EMF or a little beyond, with a resistor less, not at all on an ideal source."""
     emf = math.sqrt(3.0) * 4 * 0.99 * FAST * SPINDLE.machine.magnet_flux_wb

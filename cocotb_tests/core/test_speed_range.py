@@ -50,18 +50,6 @@ def test_table_has_the_least_current_within_both_circles(l_d, l_q, psi):
             assert not cheaper.any(), (row, column)
 
 
-def test_bus_step_reserve_keeps_the_current_below_the_limit_above_base_speed():
-    """Full circle at the last row, less in proportion to the reserve from half of its flux limit down; no row above."""
-    flux, i_max, reserve = torque_table.linear(DRIVE.machine), 5.0, 0.16
-    table = torque_table.build(flux, DRIVE.machine.pole_pairs, i_max, reserve)
-    size = np.hypot(table.i_d_a, table.i_q_a).max(axis=1) / i_max
-    parts = np.array([torque_table.circle_part(reserve, row / (ROWS - 1)) for row in range(ROWS)])
-    assert (size <= parts * 1.001).all()
-    full = (ROWS // 2, 3 * ROWS // 4, ROWS - 1)  # rows of a torque limited by the current
-    assert size[list(full)] == pytest.approx(parts[list(full)], rel=2e-3)
-    assert parts[-1] == 1.0 and parts[0] == pytest.approx(1.0 - reserve)
-
-
 def test_references_of_any_table_stay_in_the_current_circle():
     """Random words, torques, speeds: references are within i_max, and i_q has the torque's sign."""
     rng, i_max = np.random.default_rng(3), 30000

@@ -16,7 +16,7 @@ from fluxproof.cosim.scenarios import RPM
 from fluxproof.simulate import scene as scenes
 from fluxproof.simulate.figures import figure
 from golden_model.drive import Drive
-from golden_model.torque_table import Plane, circle_part, linear
+from golden_model.torque_table import Plane, linear
 
 POINTS = 49  # speeds of the curves
 COARSE = 4  # every how many points of the plane: a curve of the report needs no more
@@ -76,21 +76,17 @@ def speed_range(drive: Drive, top: float) -> SpeedRange:
     i_d = np.broadcast_to(plane.i_d[::COARSE, None], i_q.shape)
     lambda_d, lambda_q = linear(m)(i_d, i_q)
     drop, middle = m.resistance_ohm, int(np.abs(i_d[:, 0]).argmin())
-    _, *largest = plane.most(np.inf)
-    flux = float(np.hypot(*linear(m)(*largest)))  # of the table's last row
     speeds = np.linspace(0.0, top, POINTS)
     most, without, points = np.zeros(POINTS), np.zeros(POINTS), np.zeros((POINTS, 2))
     for k, speed in enumerate(speeds):
         w = speed * m.pole_pairs
         fits = (drop * i_d - w * lambda_q) ** 2 + (drop * i_q + w * lambda_d) ** 2 <= limit**2
         allowed = np.where(fits, torque, -np.inf)
-        without[k] = max(float(allowed[middle].max()), 0.0)
-        part = circle_part(drive.control.bus_step_reserve, min(limit / max(w * flux, 1e-9), 1.0))
-        allowed = np.where(np.hypot(i_d, i_q) <= part * drive.current_limit_a * (1.0 + 1e-9), allowed, -np.inf)
         best = np.unravel_index(allowed.argmax(), allowed.shape)
         most[k], points[k] = max(float(allowed[best]), 0.0), (i_d[best], i_q[best])
         if most[k] <= 0.0:
             points[k] = np.nan
+        without[k] = max(float(allowed[middle].max()), 0.0)
     parts = np.linspace(0.0, 1.0, 12)[1:]
     found = [plane.least_current(part * plane.torque.max(), np.inf) for part in parts]
     mtpa = np.array([(0.0, 0.0), *(point for point in found if point is not None)])

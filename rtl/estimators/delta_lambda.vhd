@@ -1,13 +1,14 @@
 -- SPDX-License-Identifier: BSD-3-Clause
 -- Purpose: error of the flux estimate, from the current regulators' integrals, paper 001 eq. (15).
---   delta_lambda_d =  (u_int_q - r*i_q) * factor * 2**n_omega
---   delta_lambda_q = -(u_int_d - r*i_d) * factor * 2**n_omega
+--   delta_lambda_d =  (u_int_q - r*i_q - left_q) * factor * 2**n_omega
+--   delta_lambda_q = -(u_int_d - r*i_d - left_d) * factor * 2**n_omega
 -- u_int is that of two samples before.  While the integrals contain other voltages (voltage at its limit, a current
--- converter at its end, voltage not known) delta_lambda decays by a sixteenth per sample; zero while the gates are off.
+-- converter at its end, voltage not known) delta_lambda decays by a sixteenth per sample and left = u_int - r*i, which
+-- then fades by 1/128 per sample; zero while the gates are off.
 -- One pipeline for both results: d, then q a clock later.
--- Formats: r U(0,24), u_int and the difference 28 fraction bits, factor S(0,17), out FLUX.
+-- Formats: r U(0,24), u_int, left and the differences 28 fraction bits, factor S(0,17), out FLUX.
 -- Latency: 12 (d, then q).  Interval: 12.
--- Rounding: half up after r*i, the shift and the factor.  The shifted difference saturates, which is reported unless
+-- Rounding: half up after r*i, the fading, the shift and the factor.  The shifted difference saturates, which is reported unless
 -- the factor is zero.  The other results fit: |r*i| < 2 and |factor| < 1.
 
 library ieee;
@@ -44,7 +45,7 @@ end entity delta_lambda;
 architecture rtl of delta_lambda is
   constant LATENCY : positive := DELTA_LAMBDA_LATENCY;
   constant REST_W  : positive := INTEGRAL_W + 1;
-  constant WIDE_W  : positive := REST_W + DELTA_LAMBDA_N_MAX;  -- room for the largest shift
+  constant WIDE_W  : positive := REST_W + 1 + DELTA_LAMBDA_N_MAX;  -- room for the largest shift
   constant DROP    : positive := DELTA_LAMBDA_DROP_SHIFTED;
 
   constant NOTHING : signed(0 downto 0) := "0";
@@ -56,6 +57,8 @@ architecture rtl of delta_lambda is
     u_int_q_1 : signed(INTEGRAL_W - 1 downto 0);
     u_int_d_2 : signed(INTEGRAL_W - 1 downto 0);  -- of the sample before
     u_int_q_2 : signed(INTEGRAL_W - 1 downto 0);
+    left_d    : signed(REST_W - 1 downto 0);      -- what a hold has left in the integral
+    left_q    : signed(REST_W - 1 downto 0);
   end record state_t;
 
   signal state : state_t;
@@ -81,6 +84,17 @@ architecture rtl of delta_lambda is
   begin
     return resize(delta - round_half_up(delta, DELTA_LAMBDA_FADE), FLUX_W);
   end function;
+
+  -- left of the next sample
+  function kept (left : signed; rest : signed; held : std_logic; run : std_logic) return signed is
+  begin
+    if run = '0' then
+      return to_signed(0, REST_W);
+    elsif held = '1' then
+      return rest;
+    end if;
+    return resize(left - round_half_up(left, DELTA_LAMBDA_FORGET), REST_W);
+  end function;
 begin
   valid(0) <= in_valid;
   by_r     <= signed('0' & r);
@@ -97,6 +111,8 @@ begin
 
   process (clk)
     variable rounded_7 : signed(WIDE_W - DROP downto 0);
+    variable rest_5    : signed(REST_W - 1 downto 0);
+    variable left_5    : signed(REST_W - 1 downto 0);
   begin
     if rising_edge(clk) then
       valid(1 to LATENCY) <= valid(0 to LATENCY - 1);
@@ -106,8 +122,16 @@ begin
       i_1     <= i_d when valid(1) = '1' else i_q;
       held    <= '0' when sat_d = 0 and sat_q = 0 and current_at_rail = 0 and voltage_known = '1' else run;
 
-      -- Stages 5, 6: shifted = rest * 2**n_omega, by multiples of four, then by the remainder
-      coarse_5  <= shift_left(resize(rest_4(REST_W - 1 downto 0), WIDE_W), to_integer(n_omega(3 downto 2) & "00"));
+      -- Stages 5, 6: shifted = (rest - left) * 2**n_omega, by multiples of four, then by the remainder
+      rest_5   := rest_4(REST_W - 1 downto 0);
+      left_5   := state.left_d when valid(5) = '1' else state.left_q;
+      coarse_5 <= shift_left(resize(rest_5, WIDE_W) - left_5, to_integer(n_omega(3 downto 2) & "00"));
+      if valid(4) = '1' then
+        state.left_q <= kept(state.left_q, rest_5, held, run);
+      end if;
+      if valid(5) = '1' then
+        state.left_d <= kept(state.left_d, rest_5, held, run);
+      end if;
       shifted_6 <= shift_left(coarse_5, to_integer(n_omega(1 downto 0)));
 
       -- Stage 7: value = shifted, narrowed;  the factor, negative for q

@@ -1177,6 +1177,7 @@ package fluxproof_pkg is
   constant DELTA_LAMBDA_DROP_SHIFTED : natural := 5;
   constant DELTA_LAMBDA_DROP_FACTOR : natural := 17;
   constant DELTA_LAMBDA_FADE : natural := 4;
+  constant DELTA_LAMBDA_FORGET : natural := 7;
   constant DELTA_LAMBDA_N_MAX : natural := 12;
 
   -- direction_current: none: docs/position.md
