@@ -37,7 +37,7 @@ CONVERTERS = {"codes": Cells(0, 0), "spi": Cells(442, 0), "xadc": Cells(156, 0),
 BOARD = Cells(114 + 3 + 42 + 3 + 1510, 0)  # what else a board has, its registers for the core's
 OPTIONS = {  # keys of [core] that build a block in: position.md, speed_range.md, faults.md, telemetry.md, modes.md
     "position_loop": Cells(707 + 269, 2), "references": Cells(1084, 6), "residual": Cells(2059, 1),
-    "ring_rows": Cells(97, 0), "modes": Cells(5 + 297, 0),
+    "ring_rows": Cells(97, 0), "modes": Cells(5 + 353, 0),
 }  # fmt: skip
 MOTOR = Cells(3748, 30)  # motor_bench without its registers: docs/hil.md
 
