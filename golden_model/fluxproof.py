@@ -67,7 +67,6 @@ from golden_model.io import (
     sample_guard,
     sample_latch,
     speed,
-    still_check,
     u_dc_conditioning,
     u_dc_processing,
 )
@@ -132,8 +131,7 @@ WIRING = {
     "checks": (sample_checks, ("conditioning", "bus_voltage")),
     "zero_check": (offset_check, ("conditioning", "speed_measurement")),
     "motion": (motion_checks, ("regeneration",)),
-    "still": (still_check, ("speed_measurement",)),
-    "emf": (emf_check, ("circle", "still")),
+    "emf": (emf_check, ("circle",)),
     "load": (load_check, ("motion", "conditioning", "angle")),
     "chopper": (brake_chopper, ("bus_voltage",)),
 }
@@ -280,7 +278,6 @@ class State(NamedTuple):
     of_sample_checks: sample_checks.State = sample_checks.State()
     of_offset_check: offset_check.State = offset_check.State()
     of_motion_checks: motion_checks.State = motion_checks.State()
-    of_still_check: still_check.State = still_check.State()
     of_emf_check: emf_check.State = emf_check.State()
     of_load_check: load_check.State = load_check.State()
     of_brake_chopper: brake_chopper.State = brake_chopper.State()
@@ -630,21 +627,16 @@ def step_table(state, sample, regs, config, of_speed, table):
         state.of_motion_checks, omega_me, omega_asked, regulates, speed_limited, regen_limited, x.run, r.omega_trip,
         r.omega_away, r.runaway_samples, r.omega_stall, r.stall_samples,
     )  # fmt: skip
-    still_check_state, (stands, omega_was) = still_check.step(
-        state.of_still_check, x.position_code, omega_me, x.run, of_speed.position_restart, r.still_turn, r.slow_turn,
-        c.position_bits,
-    )  # fmt: skip
     emf_check_state, (encoder_lost,) = emf_check.step(
         state.of_emf_check,
         emf_check.Inputs(
             u_d=u_d, u_q=u_q, u_comp_d=given.u_comp_d, u_comp_q=given.u_comp_q, i_d=i_d, i_q=i_q, model_d=model_d,
-            model_q=model_q, omega_me=omega_me, run=x.run, stands=stands, omega_was=omega_was,
+            model_q=model_q, omega_me=omega_me, run=x.run,
         ),
         emf_check.Registers(
-            r_s=r.r_s, emf_min=r.emf_min, emf_l=r.emf_l, emf_i=r.emf_i, emf_w=r.emf_w,
-            emf_samples=of_speed.emf_samples, still_samples=r.still_samples,
+            r_s=r.r_s, emf_min=r.emf_min, emf_l=r.emf_l, emf_i=r.emf_i, emf_w=r.emf_w, emf_samples=of_speed.emf_samples
         ),
-    )  # fmt: skip  # fmt: skip
+    )  # fmt: skip
     load_check_state, (open_load,) = load_check.step(
         state.of_load_check, i_a, i_b, i_c, i_q_ref, theta_me, x.run, motion_faults, r.i_open
     )
@@ -657,7 +649,7 @@ def step_table(state, sample, regs, config, of_speed, table):
         of_flux_monitor=after.of_flux_monitor, of_v_dead_adaline=after.of_v_dead_adaline,
         of_psi_adaline=after.of_psi_adaline, of_clean_voltage=after.of_clean_voltage, of_sample_checks=checks_state,
         of_offset_check=offset_check_state, of_motion_checks=motion_checks_state,
-        of_still_check=still_check_state, of_emf_check=emf_check_state, of_load_check=load_check_state,
+        of_emf_check=emf_check_state, of_load_check=load_check_state,
         of_brake_chopper=brake_chopper_state, sat_d=sat_d, sat_q=sat_q, compare_a=compare_a, compare_b=compare_b,
         compare_c=compare_c, lambda_m_alpha=after.lambda_m_alpha, lambda_m_beta=after.lambda_m_beta,
         merge_known=after.merge_known, lambda_pi_d=after.lambda_pi_d, lambda_pi_q=after.lambda_pi_q,

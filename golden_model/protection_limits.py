@@ -19,7 +19,6 @@ from golden_model.io.emf_check import SAMPLES as EMF_SAMPLES
 from golden_model.io.fault_latch import NAMES
 from golden_model.io.motion_checks import AWAY as AWAY_COUNT
 from golden_model.io.offset_check import OFFSET
-from golden_model.io.still_check import SLOW, STILL
 from golden_model.scale_entry import Entry, base_keys, leg_loss_v
 from golden_model.units import TURN_RAD
 
@@ -36,9 +35,6 @@ JUMP_CODES, JUMP_TURN = 4, 5e-4  # of the position, per sample: quantisation of 
 EMF_OF_RATED, EMF_OF_LEG, EMF_OF_R, EMF_OF_PSI, EMF_OF_LI, EMF_OF_PSI_HALL = 0.02, 1.6, 0.5, 0.3, 0.3, 0.8
 # So long at least; over the current loop's bandwidth; with Hall sensors; sectors in that time, whose EMF is not seen
 EMF_S, EMF_OF_LOOP, EMF_HALL_S, EMF_SECTORS = 2.8e-3, 1.4, 0.05, 1.0
-# A code stands that changes by less codes, or by less sectors of Hall sensors; no shaft brakes harder than with so many
-# times the torque at the current limit
-STILL_CODES, STILL_SECTORS, BRAKED = 2, 1.25, 1.5
 # The mean residual of a described motor: of the EMF at rated speed; of the voltage of dead time and devices; of R*i; of
 # the flux; of L*i at the limit; the sum of the currents: of the rated one, of each current; a light load: of
 # the rated current; the angle that a mean covers
@@ -63,8 +59,10 @@ def protection(drive):
     yield _limit("u_dc_min", p.u_dc_min_v, BUS_LOW * bus, "V", b.voltage_v, "u_dc_min_v", keys, volts)
     most = default_u_dc_max_v(drive)
     yield _limit("u_dc_max", p.u_dc_max_v, most, "V", b.voltage_v, "u_dc_max_v", keys, volts)
-    keys = "[sensors] position_bits" if drive.encoder.counts is None else "[encoder] counts"
-    jump = JUMP_CODES / finest(drive) + s.position_pole_pairs * JUMP_TURN  # turns of the code
+    finest, keys = 2.0**s.position_bits, "[sensors] position_bits"
+    if drive.encoder.counts is not None:
+        finest, keys = float(drive.encoder.counts), "[encoder] counts"
+    jump = JUMP_CODES / finest + s.position_pole_pairs * JUMP_TURN  # turns of the code
     if p.position_jump_rad is not None:
         jump, keys = s.position_pole_pairs * p.position_jump_rad / TURN_RAD, "[protection] position_jump_rad"
     yield Entry("jump_max", jump, "turn", 1.0, keys)
@@ -78,11 +76,6 @@ def protection(drive):
     yield from residual_limits(drive)
     yield from brake_limits(drive)
     yield from regeneration_line(drive)
-
-
-def finest(drive):
-    """Different codes in a turn of the sensor."""
-    return 2.0**drive.sensors.position_bits if drive.encoder.counts is None else float(drive.encoder.counts)
 
 
 def emf_limits(drive):
@@ -103,30 +96,11 @@ def emf_limits(drive):
     flux = (EMF_OF_PSI_HALL if hall else EMF_OF_PSI) * m.magnet_flux_wb
     flux += EMF_OF_LI * max(m.inductance_d_h, m.inductance_q_h) * drive.current_limit_a
     yield _fitting("emf_w", flux, "Wb", b.flux_wb, EMF_W, f"[machine] magnet_flux_wb; {keys}")
-    soon = max(EMF_S, EMF_OF_LOOP / (drive.control.current_bandwidth_hz or math.inf))
-    lasts, key = p.encoder_lost_s, f"[protection] encoder_lost_s; {sample}"
+    lasts = p.encoder_lost_s
     if lasts is None:
-        lasts = min(EMF_HALL_S if hall else soon, EMF_SAMPLES.hi * t_s)
-    yield Entry("emf_samples", lasts, "s", t_s, key)
-    yield Entry("still_samples", min(lasts, soon), "s", t_s, f"{key}; [control] current_bandwidth_hz")
-    yield from still_limits(drive)
-
-
-def still_limits(drive):
-    """From which change on a code moves, and how fast a shaft stops; off where the inertia is not known."""
-    m, s, t_s = drive.machine, drive.sensors, drive.sample_time_s
-    torque = m.magnet_flux_wb + abs(m.inductance_d_h - m.inductance_q_h) * drive.current_limit_a / 2.0
-    torque *= 1.5 * m.pole_pairs * drive.current_limit_a
-    still, keys = STILL_CODES / finest(drive), "[encoder] counts; [sensors] position_bits"
-    slow = BRAKED * torque / (m.inertia_kgm2 or math.inf) * t_s**2 * s.position_pole_pairs / TURN_RAD
-    if drive.encoder.kind == "hall":  # its code is electrical
-        still, keys = STILL_SECTORS / 6.0, "none: sectors"
-        slow *= m.pole_pairs / s.position_pole_pairs
-    if not 0.0 < slow <= SLOW.hi * SLOW.lsb:
-        still, slow = 0.0, 0.0
-    yield Entry("still_turn", min(still, STILL.hi * STILL.lsb), "turn", 1.0, f"{keys}; [machine] inertia_kgm2")
-    keys = "[machine] inertia_kgm2, pole_pairs, magnet_flux_wb; [control] current_limit_a; [inverter] pwm_frequency_hz"
-    yield Entry("slow_turn", max(slow, SLOW.lsb), "turn", 1.0, keys)
+        lasts = EMF_HALL_S if hall else max(EMF_S, EMF_OF_LOOP / (drive.control.current_bandwidth_hz or math.inf))
+        lasts = min(lasts, EMF_SAMPLES.hi * t_s)
+    yield Entry("emf_samples", lasts, "s", t_s, f"[protection] encoder_lost_s; {sample}")
 
 
 def residual_limits(drive):

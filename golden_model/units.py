@@ -69,9 +69,8 @@ _ONE_OF_REGISTER = {
     "move_speed": "2*pi/T_s",
     **dict.fromkeys(("dead_time", "min_pulse", "watchdog"), "1/clock_hz"),
     **dict.fromkeys(
-        ("runaway_samples", "stall_samples", "emf_samples", "still_samples", "residual_samples", "heartbeat"), "T_s"
+        ("runaway_samples", "stall_samples", "emf_samples", "residual_samples", "heartbeat", "charge_samples"), "T_s"
     ),
-    "charge_samples": "T_s",
 }
 
 

@@ -830,12 +830,6 @@ extern "C" {
 #define FLUXPROOF__CHARGE_SAMPLES__VALUE_bw 10
 #define FLUXPROOF__CHARGE_SAMPLES__VALUE_reset 0x0
 
-// reg - fluxproof::still_samples
-#define FLUXPROOF__STILL_SAMPLES__VALUE_bm 0xfff
-#define FLUXPROOF__STILL_SAMPLES__VALUE_bp 0
-#define FLUXPROOF__STILL_SAMPLES__VALUE_bw 12
-#define FLUXPROOF__STILL_SAMPLES__VALUE_reset 0x0
-
 // reg - fluxproof::use_table
 #define FLUXPROOF__USE_TABLE__VALUE_bm 0x1
 #define FLUXPROOF__USE_TABLE__VALUE_bp 0
@@ -895,18 +889,6 @@ extern "C" {
 #define FLUXPROOF__TORQUE_STEP__VALUE_bp 0
 #define FLUXPROOF__TORQUE_STEP__VALUE_bw 32
 #define FLUXPROOF__TORQUE_STEP__VALUE_reset 0x0
-
-// reg - fluxproof::still_turn
-#define FLUXPROOF__STILL_TURN__VALUE_bm 0x1ffff
-#define FLUXPROOF__STILL_TURN__VALUE_bp 0
-#define FLUXPROOF__STILL_TURN__VALUE_bw 17
-#define FLUXPROOF__STILL_TURN__VALUE_reset 0x0
-
-// reg - fluxproof::slow_turn
-#define FLUXPROOF__SLOW_TURN__VALUE_bm 0xfffff
-#define FLUXPROOF__SLOW_TURN__VALUE_bp 0
-#define FLUXPROOF__SLOW_TURN__VALUE_bw 20
-#define FLUXPROOF__SLOW_TURN__VALUE_reset 0x0
 
 // reg - fluxproof::position_mode
 #define FLUXPROOF__POSITION_MODE__VALUE_bm 0x1
@@ -2198,7 +2180,7 @@ typedef struct {
     uint32_t double_update;
     uint32_t regen_slope;
     uint32_t charge_samples;
-    uint32_t still_samples;
+    uint8_t RESERVED_24c_24f[0x4];
     uint32_t use_table;
     uint32_t k_flux;
     uint32_t u_share;
@@ -2209,8 +2191,7 @@ typedef struct {
     uint32_t table_word;
     uint32_t v_start;
     uint32_t torque_step;
-    uint32_t still_turn;
-    uint32_t slow_turn;
+    uint8_t RESERVED_278_27f[0x8];
     uint32_t position_mode;
     uint32_t position_target;
     uint32_t position_kp;

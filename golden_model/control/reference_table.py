@@ -140,11 +140,9 @@ def bound(v, _state):
     return {"i_d_table": current, "i_q_table": current, "torque_max": 1.5 * top + 2.0 * PU.lsb}
 
 
-def possible(row, config):
-    """A write only of what the table holds there: its content is a parameter of the model."""
-    word, table = row["table_word"], EXAMPLE if config["EXAMPLE"] else BLANK
-    held = int(table[int(word & SELECT != 0), (word & (SELECT - 1)) >> ADDRESS])
-    return row | {"table_word": word >> ADDRESS << ADDRESS | held & ((1 << ADDRESS) - 1)}
+def possible(row, _config):
+    """No write into the table: its content is a parameter of the model."""
+    return row | {"table_word": row["table_word"] & (WRITE - 1)}
 
 
 def stimuli(rng, _config):

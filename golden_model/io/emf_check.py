@@ -11,12 +11,6 @@ In steady state nothing is left.  With an encoder that stands while the motor tu
 turns while the motor stands, or with a wrong angle, the promise.  ``encoder_lost`` when ``emf_samples`` more samples
 were over than not; a step of the current lasts shorter.  ``emf_samples`` = 0 or ``run`` = 0: nothing is
 counted.
-
-While the code ``stands`` although the shaft cannot (still_check), the sensor is frozen or the shaft jammed:
-
-    most = emf_i*|i| + emf_w*omega_was/2             a jammed shaft has no EMF, one that turns on that of omega_was
-
-and ``still_samples`` more samples over than not are a lost encoder.
 |x| of a vector is the larger component and half the smaller one, up to 12 % more than its length.
 
 Formats: fluxes S(1,23), model saturated; products cut (floor) to 2**-16; |x| of a component is the one's complement
@@ -31,7 +25,6 @@ from golden_model.block import Block, Port
 from golden_model.estimators.flux_models import DROP_MODEL, MODEL_FLUX, MODEL_MAX
 from golden_model.fixed import Format, length, saturate
 from golden_model.formats import BIT, FLUX, FLUX_W, PU, PU_W, RESISTANCE
-from golden_model.io.still_check import SPEED_MAX
 from golden_model.kernel import kernel
 
 EMF_MIN = Format(0, 1, 16)
@@ -63,16 +56,14 @@ def step(state, inputs, regs):
     e_q = x.u_q - x.u_comp_q - ((x.i_q * r_s) >> DROP) - ((x.omega_me * flux_d) >> DROP)
     e_q -= (change_q * r.emf_l) >> DROP
     current = min(length(x.i_d, x.i_q), PU_HI)
-    size = x.omega_me if x.omega_me >= 0 else -1 - x.omega_me
-    speed = x.omega_was >> 1 if x.stands else size
-    most = (0 if x.stands else r.emf_min) + ((current * r.emf_i) >> DROP) + ((speed * r.emf_w) >> DROP)
+    speed = x.omega_me if x.omega_me >= 0 else -1 - x.omega_me
+    most = r.emf_min + ((current * r.emf_i) >> DROP) + ((speed * r.emf_w) >> DROP)
     over = length(e_d, e_q) > most
     count = min(state.count + 1, SAMPLES_HI) if over else max(state.count - 1, 0)
     if not x.run or r.emf_samples == 0:
         count = 0
     following = State(state.sum_d + x.i_d - mean_d, state.sum_q + x.i_q - mean_q, count)
-    wanted = r.still_samples if x.stands else r.emf_samples
-    return following, (1 if count > 0 and count >= wanted else 0,)
+    return following, (1 if count > 0 and count >= r.emf_samples else 0,)
 
 
 def stimuli(rng, _config):
@@ -108,19 +99,14 @@ def stimuli(rng, _config):
         r_s = row["r_s"] >> HALF_R
         u_d = ((i_d * r_s) >> DROP) - ((w * (row["model_q"] >> DROP_MODEL)) >> DROP)
         u_q = ((i_q * r_s) >> DROP) + ((w * (row["model_d"] >> DROP_MODEL)) >> DROP)
-        row |= {"stands": int(rng.integers(4) == 0), "omega_was": int(rng.integers(PU.hi >> 2))}
-        row |= {"emf_samples": 1 + row["stands"], "still_samples": 1}
-        speed = row["omega_was"] >> 1 if row["stands"] else w if w >= 0 else -1 - w
-        most = (0 if row["stands"] else row["emf_min"]) + ((length(i_d, i_q) * row["emf_i"]) >> DROP)
-        most += ((speed * row["emf_w"]) >> DROP) + int(rng.integers(-1, 3))
+        most = row["emf_min"] + ((length(i_d, i_q) * row["emf_i"]) >> DROP)
+        most += (((w if w >= 0 else -1 - w) * row["emf_w"]) >> DROP) + int(rng.integers(-1, 3))
         axis = rng.integers(2)
         row |= {"u_d": u_d + most * (1 - axis), "u_q": u_q + most * axis}
         rows.append({n: max(PU.lo, min(PU.hi, int(v))) if n[0] == "u" else int(v) for n, v in row.items()})
     for wanted in (0, 1, 2, 3, 9):
         for over, clocks in ((1, 11), (0, 4), (1, 3), (0, 30), (1, wanted + 1)):
-            rows += [usual | {"u_d": 100 * over, "emf_samples": wanted, "still_samples": 1}] * clocks
-            still = {"stands": 1, "emf_samples": 5, "still_samples": wanted}
-            rows += [usual | still | {"u_d": 100 * over}] * clocks
+            rows += [usual | {"u_d": 100 * over, "emf_samples": wanted}] * clocks
         rows += [usual | {"u_d": 100, "emf_samples": wanted, "run": 0}, usual | {"emf_samples": wanted}]
     return rows
 
@@ -147,8 +133,6 @@ INPUTS = (
     Port("model_q", MODEL_FLUX, -MODEL_MAX, MODEL_MAX, "flux linkage of the current model, q axis"),
     Port("omega_me", PU, doc="electrical speed"),
     Port("run", BIT, doc="1: gates are switching"),
-    Port("stands", BIT, doc="1: the code stands although the shaft cannot have stopped"),
-    Port("omega_was", SPEED_MAX, doc="size of the electrical speed when the code moved last"),
 )
 Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
 REGISTERS = (
@@ -158,7 +142,6 @@ REGISTERS = (
     Port("emf_i", EMF_I, doc="the same for each current"),
     Port("emf_w", EMF_W, doc="the same for each electrical speed"),
     Port("emf_samples", SAMPLES, doc="samples with a wrong EMF, more than right ones, that are a lost encoder; 0: off"),
-    Port("still_samples", SAMPLES, doc="the same while the code stands although the shaft cannot have stopped"),
 )
 Registers = namedtuple("Registers", [p.name for p in REGISTERS])
 

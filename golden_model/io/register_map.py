@@ -122,7 +122,6 @@ _SETTINGS = """
     200 omega_trip    204 omega_away     208 runaway_samples               20c omega_stall  210 stall_samples
     214 i_open        218 offset_max     21c heartbeat    220 brake_on     224 brake_off
     228 emf_min       22c emf_i          230 emf_w        234 emf_samples    238 emf_l
-    24c still_samples   278 still_turn     27c slow_turn
     240 double_update
     250 use_table     254 k_flux         258 u_share      25c k_voltage      260 share_min    264 k_torque
     268 omega_learn   26c table_word     270 v_start        274 torque_step
@@ -136,7 +135,7 @@ _SETTINGS = """
     350 residual_sum_max                 354 residual_sum_i
     378 residual_leg  37c residual_light
     380 residual_slow
-"""  # 2d4 to 2dc, 2e8 to 33c, 384 to 3bc and 3f0 to 3fc are free
+"""  # 24c, 278 to 27c, 2d4 to 2dc, 2e8 to 33c, 384 to 3bc and 3f0 to 3fc are free
 _COMMANDS = {
     "enable": (0x040, Kind.COMMAND),
     "clear_trip": (0x044, Kind.PULSE),

@@ -182,14 +182,11 @@ package fluxproof_pkg is
     omega_away       : unsigned(LIMIT_W - 1 downto 0);  -- speed against the reference from which a runaway is looked for
     runaway_samples  : unsigned(11 downto 0);  -- samples in sequence against the reference without braking that trip
     stall_samples    : unsigned(15 downto 0);  -- samples in sequence at the current limit at rest that are a stall
-    still_turn       : unsigned(SAMPLE_TIME_W - 1 downto 0);  -- a code that changes by less stands; 0: no check of a code that stands
-    slow_turn        : unsigned(19 downto 0);  -- largest deceleration, turns of the code a sample squared
     emf_min          : unsigned(DUTY_W - 1 downto 0);  -- voltage that the EMF may be wrong by at rest without current
     emf_l            : unsigned(23 downto 0);  -- inductance over eight samples
     emf_i            : unsigned(22 downto 0);  -- the same for each current
     emf_w            : unsigned(23 downto 0);  -- the same for each electrical speed
     emf_samples      : unsigned(11 downto 0);  -- samples with a wrong EMF, more than right ones, that are a lost encoder; 0: off
-    still_samples    : unsigned(11 downto 0);  -- the same while the code stands although the shaft cannot have stopped
     i_open           : unsigned(LIMIT_W - 1 downto 0);  -- current that a connected phase reaches when twice as much is asked for
     brake_on         : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage from which the brake resistor is on; 0: none
     brake_off        : unsigned(LIMIT_W - 1 downto 0);  -- bus voltage below which it is off
@@ -1349,14 +1346,6 @@ package fluxproof_pkg is
   constant SPEED_TO_PU : natural := 12;
   constant SPEED_DROP_RAW : natural := 14;
   constant SPEED_DROP_STATE : natural := 4;
-
-  -- still_check: none: protection and diagnosis of the drive
-  constant STILL_CHECK_LATENCY : positive := 8;
-  constant STILL_CHECK_SHIFT : natural := 8;
-  constant STILL_CHECK_OWED_W : natural := 28;
-  constant STILL_CHECK_MEAN : natural := 2;
-  constant STILL_CHECK_STILL_TIMES : natural := 3;
-  constant STILL_CHECK_SLOW_TIMES : natural := 2;
 
   -- telemetry: none: recording of samples
   constant TELEMETRY_LATENCY : positive := 1;

@@ -760,10 +760,6 @@ begin
         settings.charge_samples <= unsigned(held(9 downto 0));
         written(146)            <= '1';
       end if;
-      if (row(18) and column(3) and not sample_busy) = '1' then
-        settings.still_samples <= unsigned(held(11 downto 0));
-        written(147)           <= '1';
-      end if;
       if REFERENCES = 1 and (row(18) and column(4) and not sample_busy) = '1' then
         settings.use_table <= held(0);
         written(148)       <= '1';
@@ -803,14 +799,6 @@ begin
       if REFERENCES = 1 and (row(19) and column(5) and not sample_busy) = '1' then
         settings.torque_step <= signed(held(17 downto 0));
         written(157)         <= '1';
-      end if;
-      if (row(19) and column(6) and not sample_busy) = '1' then
-        settings.still_turn <= unsigned(held(16 downto 0));
-        written(158)        <= '1';
-      end if;
-      if (row(19) and column(7) and not sample_busy) = '1' then
-        settings.slow_turn <= unsigned(held(19 downto 0));
-        written(159)       <= '1';
       end if;
       if POSITION_LOOP = 1 and (row(20) and column(0) and not sample_busy) = '1' then
         settings.position_mode <= held(0);
@@ -1502,7 +1490,6 @@ begin
         settings.double_update    <= '0';
         settings.regen_slope      <= (others => '0');
         settings.charge_samples   <= (others => '0');
-        settings.still_samples    <= (others => '0');
         settings.use_table        <= '0';
         settings.k_flux           <= (others => '0');
         settings.u_share          <= (others => '0');
@@ -1513,8 +1500,6 @@ begin
         settings.table_word       <= (others => '0');
         settings.v_start          <= (others => '0');
         settings.torque_step      <= (others => '0');
-        settings.still_turn       <= (others => '0');
-        settings.slow_turn        <= (others => '0');
         settings.position_mode    <= '0';
         settings.position_target  <= (others => '0');
         settings.position_kp      <= (others => '0');

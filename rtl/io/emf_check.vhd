@@ -4,8 +4,6 @@
 --   e_q = u_q - u_comp_q - r_s*i_q - emf_l*(i_q - mean_q) - omega_me*model_d;  mean += (i - mean)/8 after each sample
 --   over = |e| > emf_min + emf_i*|i| + emf_w*|omega_me|
 -- encoder_lost when emf_samples more samples were over than not; emf_samples = 0 or run = 0: nothing is counted.
--- While the code stands although the shaft cannot have stopped: over = |e| > emf_i*|i| + emf_w*omega_was/2, and
--- still_samples; a jammed shaft has no EMF.
 -- |x| of a vector is the larger component and half the smaller one.  One multiplier makes the eight products in turn.
 -- Formats: fluxes S(1,23), model saturated.  Latency: 13.  Interval: 13.
 -- Rounding: products are cut (floor) to 2**-16, |x| is the one's complement where x is negative; |i| saturates at 2, i - mean
@@ -19,30 +17,27 @@ use work.fluxproof_pkg.all;
 
 entity emf_check is
   port (
-    clk           : in  std_logic;
-    rst           : in  std_logic;
-    in_valid      : in  std_logic;
-    u_d           : in  signed(PU_W - 1 downto 0);
-    u_q           : in  signed(PU_W - 1 downto 0);
-    u_comp_d      : in  signed(PU_W - 1 downto 0);
-    u_comp_q      : in  signed(PU_W - 1 downto 0);
-    i_d           : in  signed(PU_W - 1 downto 0);
-    i_q           : in  signed(PU_W - 1 downto 0);
-    model_d       : in  signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
-    model_q       : in  signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
-    omega_me      : in  signed(PU_W - 1 downto 0);
-    run           : in  std_logic;
-    stands        : in  std_logic;
-    omega_was     : in  unsigned(PU_W - 2 downto 0);
-    r_s           : in  unsigned(RESISTANCE_W - 1 downto 0);
-    emf_min       : in  unsigned(16 downto 0);
-    emf_l         : in  unsigned(23 downto 0);
-    emf_i         : in  unsigned(22 downto 0);
-    emf_w         : in  unsigned(23 downto 0);
-    emf_samples   : in  unsigned(11 downto 0);
-    still_samples : in  unsigned(11 downto 0);
-    out_valid     : out std_logic;
-    encoder_lost  : out std_logic
+    clk          : in  std_logic;
+    rst          : in  std_logic;
+    in_valid     : in  std_logic;
+    u_d          : in  signed(PU_W - 1 downto 0);
+    u_q          : in  signed(PU_W - 1 downto 0);
+    u_comp_d     : in  signed(PU_W - 1 downto 0);
+    u_comp_q     : in  signed(PU_W - 1 downto 0);
+    i_d          : in  signed(PU_W - 1 downto 0);
+    i_q          : in  signed(PU_W - 1 downto 0);
+    model_d      : in  signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
+    model_q      : in  signed(FLUX_MODELS_MODEL_FLUX_W - 1 downto 0);
+    omega_me     : in  signed(PU_W - 1 downto 0);
+    run          : in  std_logic;
+    r_s          : in  unsigned(RESISTANCE_W - 1 downto 0);
+    emf_min      : in  unsigned(16 downto 0);
+    emf_l        : in  unsigned(23 downto 0);
+    emf_i        : in  unsigned(22 downto 0);
+    emf_w        : in  unsigned(23 downto 0);
+    emf_samples  : in  unsigned(11 downto 0);
+    out_valid    : out std_logic;
+    encoder_lost : out std_logic
   );
 end entity emf_check;
 
@@ -70,7 +65,6 @@ architecture rtl of emf_check is
   signal less_9    : std_logic;
   signal size_10   : sum_t;
   signal over_11   : std_logic;
-  signal wanted_12 : unsigned(11 downto 0);
 
   -- 2*(i - mean), saturated
   function change (i : signed; sum : signed) return signed is
@@ -112,9 +106,6 @@ begin
         b_1 <= signed(resize(emf_i, FLUX_W));
       elsif valid(7) = '1' then
         a_1 <= size(omega_me);
-        if stands = '1' then
-          a_1 <= signed(resize(shift_right(omega_was, 1), PU_W));
-        end if;
         b_1 <= signed(resize(emf_w, FLUX_W));
       end if;
       less_1    <= smaller_is(i_d, i_q);
@@ -135,9 +126,6 @@ begin
       end if;
       if valid(8) = '1' then
         most <= signed(resize(emf_min, E_W)) + cut_2;
-        if stands = '1' then
-          most <= cut_2;
-        end if;
       elsif valid(9) = '1' then
         most <= most + cut_2;
       end if;
@@ -147,12 +135,8 @@ begin
       size_10 <= resize(length(e_d, e_q, less_9), E_W);
       over_11 <= '1' when size_10 > most else '0';
 
-      -- Stage 12: the means;  samples over, less those that were not;  as many as are a lost encoder
+      -- Stage 12: the means;  samples over, less those that were not
       if valid(11) = '1' then
-        wanted_12 <= emf_samples;
-        if stands = '1' then
-          wanted_12 <= still_samples;
-        end if;
         sum_d <= sum_d + i_d - shift_right(sum_d, EMF_CHECK_MEAN);
         sum_q <= sum_q + i_q - shift_right(sum_q, EMF_CHECK_MEAN);
         if run = '0' or emf_samples = 0 then
@@ -166,7 +150,7 @@ begin
 
       -- Stage 13: the verdict
       if valid(12) = '1' then
-        encoder_lost <= '1' when count >= wanted_12 and count /= 0 else '0';
+        encoder_lost <= '1' when count >= emf_samples and count /= 0 else '0';
       end if;
 
       if rst = '1' then

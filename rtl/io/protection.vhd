@@ -2,8 +2,8 @@
 -- Purpose: everything that turns the gates off: guard of the samples, checks, watch of the host, memory of the faults,
 -- and the brake chopper beside them.  This entity only instantiates.
 --
---   strobe -> guard -> checks of the sample, of the motion, of the load, of the sensors' zero, of the code that stands and
---   the EMF -> fault latch -> gate_trip
+--   strobe -> guard -> checks of the sample, of the motion, of the load, of the sensors' zero, of the EMF -> fault latch
+--   -> gate_trip
 --
 -- A faulty sample trips without waiting for the fault latch; without enable the gates are off and nothing is latched.
 -- brake is off while samples are missing: without a reading of the bus nothing may heat the resistor.
@@ -76,8 +76,6 @@ end entity protection;
 architecture rtl of protection is
   signal sample_early, sample_late, host_lost : std_logic;
   signal motion_valid, fault_stop             : std_logic;
-  signal stands                               : std_logic;
-  signal omega_was                            : unsigned(PU_W - 2 downto 0);
 begin
 
   guard : entity work.sample_guard
@@ -120,21 +118,12 @@ begin
               i_open => settings.i_open,
               out_valid => open, open_load => open_load);
 
-  still : entity work.still_check
-    generic map (POSITION_BITS => POSITION_BITS)
-    port map (clk => clk, rst => rst, in_valid => omega_valid,
-              code_theta => code_theta, omega_me => omega_me, run => run,
-              position_restart => settings.position_restart,
-              still_turn => settings.still_turn, slow_turn => settings.slow_turn,
-              out_valid => open, stands => stands, omega_was => omega_was);
-
   emf : entity work.emf_check
     port map (clk => clk, rst => rst, in_valid => voltage_valid,
               u_d => u_d, u_q => u_q, u_comp_d => u_comp_d, u_comp_q => u_comp_q, i_d => i_d, i_q => i_q,
               model_d => model_d, model_q => model_q, omega_me => omega_me, run => run,
-              stands => stands, omega_was => omega_was,
               r_s => settings.r_s, emf_min => settings.emf_min, emf_l => settings.emf_l, emf_i => settings.emf_i, emf_w => settings.emf_w,
-              emf_samples => settings.emf_samples, still_samples => settings.still_samples,
+              emf_samples => settings.emf_samples,
               out_valid => open, encoder_lost => encoder_lost);
 
   chopper : entity work.brake_chopper

@@ -7,7 +7,6 @@ from scripts.prove.proof import Fault, Proof, committed
 
 LATCH = "io/fault_latch.vhd"
 GUARD = "io/sample_guard.vhd"
-STILL = "io/still_check.vhd"
 
 
 def proof(name: str, says: str, entity: str, macros: tuple[str, ...], *faults: Fault, **more) -> Proof:
@@ -67,20 +66,5 @@ PROOFS = (
         Fault("age does not count", GUARD, "if expired = '0' then", "if busy = '1' then"),
         generics={"INTERVAL": 12},
         assumed="watchdog below 40 and constant, INTERVAL 12",
-    ),
-    Proof(
-        name="protection_still",
-        says="a code is told to stand only with switching gates, still_turn above 0, and not where it began anew",
-        entity="still_check",
-        harness=committed("still_check.sv"),
-        faults=(
-            Fault("without switching gates", STILL, "if off_7 = '0' or run = '0' then", "if off_7 = '0' then"),
-            Fault("although it is off", STILL, "still_turn /= 0 and unsigned", "unsigned"),
-            Fault("a code that moves still owes", STILL, "if (moved_2 or back_5) = '1' then", "if back_5 = '1' then"),
-        ),
-        depth=20,
-        free=("least_2", "change_4"),
-        search_depth=60,
-        assumed="a sample every nine clocks, no reset later, constant registers; any speeds",
     ),
 )  # fmt: skip

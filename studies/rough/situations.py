@@ -15,7 +15,6 @@ from fluxproof.checkout import DRIVES
 from fluxproof.cosim.axi_clock import writes_in
 from fluxproof.cosim.board_clock import PINS
 from fluxproof.cosim.fault_run import FaultRun, edges_run, serial_run
-from fluxproof.plant import layout as L
 from golden_model.drive import Drive, load, with_carrier
 from golden_model.drive_keys import needed
 from golden_model.io import board_faults, fault_latch
@@ -31,7 +30,6 @@ HALLS = ("hub_36v",)
 SPEEDS = (0.03, 0.1, 0.3, 0.8)
 ALLOWED_S = {0.03: 0.05, 0.1: 0.005, 0.3: 0.005, 0.8: 0.005}  # until a lost encoder is named
 HALL_ALLOWED_S = 0.1  # an edge tells the speed
-JAMS_S = 1e-3  # from the speed to rest
 SILENT = 20  # periods without a write
 UNSEEN_ALLOWED_S = 0.15  # the same where emf_check cannot see the EMF: stall_s, and the way to the current limit
 
@@ -186,25 +184,6 @@ def lost(how: Callable[[RoughBoard], None], names: tuple[str, ...]):
     return play
 
 
-def jammed(drive: Drive, part: float) -> tuple[str, bool]:
-    """The shaft is stopped within a millisecond by something that it cannot turn; its sensor is whole."""
-    board = running(drive, part)
-    if board.faults:
-        return f"{', '.join(board.faults)} before", False
-    begun, omega = board.period, float(board.plant.omega_m)
-
-    def spoil(_pins, board):
-        left = 1.0 - (board.period - begun) * drive.sample_time_s / JAMS_S
-        board.plant.state[L.OMEGA_M] = omega * max(left, 0.0)
-
-    board.spoil = spoil
-    board.until_off(UNSEEN_ALLOWED_S)
-    peak = board.peak_a / drive.current_limit_a
-    return f"{', '.join(board.faults) or 'no fault'}, peak {peak:.2f} of the limit", (
-        set(board.faults) <= {"stall"} and peak < PEAK
-    )
-
-
 def hall_levels(levels: tuple[int | None, ...], enabled: bool):
     """Levels of the three lines, None: as the sensor shows it; from before the enable on, or while it runs."""
 
@@ -293,7 +272,6 @@ TABLE = (
     Situation("A and B frozen", NAMED, EDGES, SPEEDS, lost(held, LOST)),
     Situation("all lines of A/B/Z dead", NAMED, EDGES, SPEEDS, lost(dead, LOST)),
     Situation("code frozen", NAMED, ABSOLUTE, SPEEDS, lost(held, LOST)),
-    Situation("the shaft jams", "no fault, or stall", ALL, (0.03, 0.1), jammed),
     Situation("Hall sensors frozen", "encoder_lost in 100 ms", HALLS, (0.3, 0.8), lost(held, ("encoder_lost",))),
     Situation("Hall code 111 at the enable", "hall_code, gates never on", HALLS, (0.0,), hall_levels((1, 1, 1), False)),
     Situation("Hall code 000 at the enable", "hall_code, gates never on", HALLS, (0.0,), hall_levels((0, 0, 0), False)),

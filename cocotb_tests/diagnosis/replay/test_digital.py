@@ -42,7 +42,6 @@ SILENT = ("omega_given", "dead_time", "charge_samples", "t_min", "v_comp_max")
 SILENT += ("watchdog", "i_trip", "sum_trip", "rail_samples", "u_dc_min", "u_dc_max", "jump_max", "fault_ignore")
 SILENT += ("omega_trip", "omega_away", "runaway_samples", "omega_stall", "stall_samples", "i_open", "offset_max")
 SILENT += ("heartbeat", "brake_off", "emf_min", "emf_l", "emf_i", "emf_w", "emf_samples", "regen_start")
-SILENT += ("still_turn", "slow_turn", "still_samples")
 SILENT += tuple(name for name in fluxproof.REGISTERS if name.startswith("residual_"))  # the recorded core has none
 SILENT += ("position_mode", "position_kp", "position_band", "omega_most", "position_target", "move_speed", "move_step")
 SILENT += ("jerk_bits", "use_stops", "stop_low", "stop_high", "torque_lead", "k_inertia", "k_viscous", "coulomb")
