@@ -153,15 +153,24 @@ begin
           when 0 =>
             winding                                     <= temp_2;
             sum_3(SUM_W - 1 downto MOTOR_HEAT_DROP_SUM) <= (others => '0');
-          when 1      => winding <= temp_2;
-          when 2      => magnet  <= temp_2;
-          when 3 | 8  => f_3     <= f_2;
-          when 4      => more_a  <= resize(more_2, MORE_W);
-          when 5      => more_b  <= resize(more_2, MORE_W);
-          when 6      => more_c  <= resize(more_2, MORE_W);
-          when 7      => more_h  <= resize(more_2, MORE_W);
-          when 9      => less    <= more_2;
-          when others => null;
+          when 1 =>
+            winding <= temp_2;
+          when 2 =>
+            magnet <= temp_2;
+          when 3 | 8 =>
+            f_3 <= f_2;
+          when 4 =>
+            more_a <= resize(more_2, MORE_W);
+          when 5 =>
+            more_b <= resize(more_2, MORE_W);
+          when 6 =>
+            more_c <= resize(more_2, MORE_W);
+          when 7 =>
+            more_h <= resize(more_2, MORE_W);
+          when 9 =>
+            less <= more_2;
+          when others =>
+            null;
         end case;
       end if;
 
