@@ -109,20 +109,20 @@ begin
   to_0   <= seen_w when op_0 = 1 else seen_m when op_0 = 2 else shift_left(resize(t_ref, B_W), 1);
 
   with op_0 select a_0 <=
-    signed('0' & warm_0)                 when 0,
-    signed(resize(k_winding, A_W))       when 1,
-    signed(resize(k_magnet, A_W))        when 2,
-    signed(resize(tcr_winding, A_W))     when 3,
-    signed('0' & r_a)                    when 4,
-    signed('0' & r_b)                    when 5,
-    signed('0' & r_c)                    when 6,
-    signed('0' & heating)                when 7,
-    signed(resize(tcr_magnet, A_W))      when 8,
-    psi_m                                when others;
+    signed('0' & warm_0) when 0,
+    signed(resize(k_winding, A_W)) when 1,
+    signed(resize(k_magnet, A_W)) when 2,
+    signed(resize(tcr_winding, A_W)) when 3,
+    signed('0' & r_a) when 4,
+    signed('0' & r_b) when 5,
+    signed('0' & r_c) when 6,
+    signed('0' & heating) when 7,
+    signed(resize(tcr_magnet, A_W)) when 8,
+    psi_m when others;
   with op_0 select b_0 <=
     signed('0' & sum_3(SUM_W - 1 downto MOTOR_HEAT_DROP_SUM)) when 0,
-    from_0 - to_0                                             when 1 | 2 | 3 | 8,
-    f_3                                                       when others;
+    from_0 - to_0 when 1 | 2 | 3 | 8,
+    f_3 when others;
   i_0 <= i_a when valid(1) = '1' else i_b when valid(2) = '1' else i_c;
 
   -- What it gives
