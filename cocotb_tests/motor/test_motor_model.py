@@ -32,7 +32,7 @@ from golden_model.formats import FLUX, MOTOR_FLUX, MOTOR_LEG, MOTOR_VOLTAGE, PU
 from golden_model.motor import motor_bus, motor_filter, motor_flux, motor_heat, motor_legs, motor_model, motor_shaft
 from golden_model.motor.motor_heat import HEATING, SHARE
 from golden_model.motor.motor_model import Shown
-from studies.hil import closed_loop, commissioning, equal, golden, in_ghdl, residual
+from studies.hil import closed_loop, commissioning, equal, golden, residual
 from studies.hil.beside_plant import HELD, OWN, beside_plant, follow
 from studies.hil.drive import CLOCK_HZ, CURRENT_A, SERVO, SWITCHES, U_DC_V, ride, servo
 from studies.hil.plant import ANGLE_DEG, CURRENT_PERCENT, TORQUE_PERCENT, differences
@@ -58,14 +58,6 @@ def test_core_and_motor_in_one(filter_s):
     assert not len(wrong), f"gates differ at clock {wrong[0]}"
     assert rtl.observed[-1] == golden.observed[-1]
     assert golden.observed[-1]["omega_me"] > 1000, "the shaft does not turn"
-
-
-@pytest.mark.slow
-def test_core_and_motor_in_ghdl():
-    """The VHDL as it is, with filter and temperatures on; 300 periods of it: `make hil`."""
-    done = in_ghdl.compare(10)
-    assert not len(done.wrong), f"gates differ at clock {done.wrong[0]}"
-    assert done.speed > 1000 and np.count_nonzero(np.diff(done.found)) > 100
 
 
 @pytest.mark.slow

@@ -203,6 +203,7 @@ begin
     );
 
   warm : if TEMPERATURES = 1 generate
+
     heat : entity work.motor_heat
       generic map (WINDOW_BITS => MOTOR_HEAT_WINDOW_BITS)
       port map (
@@ -213,6 +214,7 @@ begin
         out_valid => open, hot_a => hot_a, hot_b => hot_b, hot_c => hot_c, hot_psi => hot_psi,
         temp_winding => motor_temp_winding, temp_magnet => motor_temp_magnet
       );
+
   end generate;
 
   cold : if TEMPERATURES = 0 generate

@@ -109,20 +109,20 @@ begin
   to_0   <= seen_w when op_0 = 1 else seen_m when op_0 = 2 else shift_left(resize(t_ref, B_W), 1);
 
   with op_0 select a_0 <=
-    signed('0' & warm_0)                 when 0,
-    signed(resize(k_winding, A_W))       when 1,
-    signed(resize(k_magnet, A_W))        when 2,
-    signed(resize(tcr_winding, A_W))     when 3,
-    signed('0' & r_a)                    when 4,
-    signed('0' & r_b)                    when 5,
-    signed('0' & r_c)                    when 6,
-    signed('0' & heating)                when 7,
-    signed(resize(tcr_magnet, A_W))      when 8,
-    psi_m                                when others;
+    signed('0' & warm_0) when 0,
+    signed(resize(k_winding, A_W)) when 1,
+    signed(resize(k_magnet, A_W)) when 2,
+    signed(resize(tcr_winding, A_W)) when 3,
+    signed('0' & r_a) when 4,
+    signed('0' & r_b) when 5,
+    signed('0' & r_c) when 6,
+    signed('0' & heating) when 7,
+    signed(resize(tcr_magnet, A_W)) when 8,
+    psi_m when others;
   with op_0 select b_0 <=
     signed('0' & sum_3(SUM_W - 1 downto MOTOR_HEAT_DROP_SUM)) when 0,
-    from_0 - to_0                                             when 1 | 2 | 3 | 8,
-    f_3                                                       when others;
+    from_0 - to_0 when 1 | 2 | 3 | 8,
+    f_3 when others;
   i_0 <= i_a when valid(1) = '1' else i_b when valid(2) = '1' else i_c;
 
   -- What it gives
@@ -153,15 +153,24 @@ begin
           when 0 =>
             winding                                     <= temp_2;
             sum_3(SUM_W - 1 downto MOTOR_HEAT_DROP_SUM) <= (others => '0');
-          when 1      => winding <= temp_2;
-          when 2      => magnet  <= temp_2;
-          when 3 | 8  => f_3     <= f_2;
-          when 4      => more_a  <= resize(more_2, MORE_W);
-          when 5      => more_b  <= resize(more_2, MORE_W);
-          when 6      => more_c  <= resize(more_2, MORE_W);
-          when 7      => more_h  <= resize(more_2, MORE_W);
-          when 9      => less    <= more_2;
-          when others => null;
+          when 1 =>
+            winding <= temp_2;
+          when 2 =>
+            magnet <= temp_2;
+          when 3 | 8 =>
+            f_3 <= f_2;
+          when 4 =>
+            more_a <= resize(more_2, MORE_W);
+          when 5 =>
+            more_b <= resize(more_2, MORE_W);
+          when 6 =>
+            more_c <= resize(more_2, MORE_W);
+          when 7 =>
+            more_h <= resize(more_2, MORE_W);
+          when 9 =>
+            less <= more_2;
+          when others =>
+            null;
         end case;
       end if;
 

@@ -2,8 +2,8 @@
 """`make hil`: figures of the motor in the FPGA, a list of {figure, ours, target, unit, pass} in build/studies/hil.json.
 
     make hil                              all, some minutes
-    make hil ARGS='--only plant'          those of a part: plant, pace, equal, loop, ghdl, residual,
-                                          truth, commission, page
+    make hil ARGS='--only plant'          those of a part: plant, pace, equal, loop, residual, truth,
+                                          commission, page
     make hil ARGS='--seconds 1'           a shorter ride
 
 Exit status 1 where a figure misses its target.
@@ -17,12 +17,11 @@ import sys
 
 from fluxproof.checkout import BUILD, ROOT
 from fluxproof.files import write_json
-from studies.hil import closed_loop, commissioning, equal, in_ghdl, pace, page, plant, residual, truth
+from studies.hil import closed_loop, commissioning, equal, pace, page, plant, residual, truth
 
 OUT = BUILD / "studies" / "hil.json"
 PARTS = {
     "plant": plant.figures, "pace": pace.figures, "equal": equal.figures, "loop": closed_loop.figures,
-    "ghdl": in_ghdl.figures,
     "residual": residual.figures, "truth": truth.figures, "commission": commissioning.figures,
     "page": page.figures,
 }  # fmt: skip
