@@ -39,7 +39,7 @@ OPTIONS = {  # keys of [core] that build a block in: position.md, speed_range.md
     "position_loop": Cells(707 + 269, 2), "references": Cells(1084, 6), "residual": Cells(2059, 1),
     "ring_rows": Cells(97, 0), "modes": Cells(5 + 353, 0),
 }  # fmt: skip
-MOTOR = Cells(3748, 30)  # motor_bench without its registers: docs/hil.md
+MOTOR = Cells(4461, 32)  # motor_bench without its registers: docs/hil.md
 
 # Device of the vendor's tables: LUT, DSP48
 DEVICES = {
