@@ -277,10 +277,10 @@ begin
                 hold_d => hold_d, hold_q => hold_q, omega_now => omega_now, hold_omega => hold_omega,
                 u_rest_d => u_rest_d, u_rest_q => u_rest_q);
 
-    i_d_asked <= i_d_now when hold_d = '1' else i_d_source;
-    by_speed  <= speed_mode and not position_acts;
+    by_speed     <= speed_mode and not position_acts;
     omega_source <= omega_now when by_speed = '1' and hold_omega = '1' else omega_ref;
-    i_q_used  <= i_q_now when hold_q = '1' or take_over = '1' else i_q_ext;
+    i_d_asked    <= i_d_now when hold_d = '1' else i_d_source;
+    i_q_used     <= i_q_now when hold_q = '1' or take_over = '1' else i_q_ext;
     -- The trajectory's torque of the sample before ends with position mode, not a sample after it
     torque_ff_used <= torque_ff and position_acts;
 
@@ -289,19 +289,19 @@ begin
     turned_d <= o.u_dec_d and not by_voltage;
     turned_q <= o.u_dec_q and not by_voltage;
   else generate
-    by_voltage <= '0';
-    take_over  <= '0';
-    follows    <= '0';
-    i_d_asked  <= i_d_source;
-    i_q_used   <= i_q_ext;
-    omega_source <= omega_ref;
+    by_voltage     <= '0';
+    take_over      <= '0';
+    follows        <= '0';
+    i_d_asked      <= i_d_source;
+    i_q_used       <= i_q_ext;
+    omega_source   <= omega_ref;
     torque_ff_used <= torque_ff;
-    u_rest_d   <= (others => '0');
-    u_rest_q   <= (others => '0');
-    asked_d    <= u_pi_d;
-    asked_q    <= u_pi_q;
-    turned_d   <= o.u_dec_d;
-    turned_q   <= o.u_dec_q;
+    u_rest_d       <= (others => '0');
+    u_rest_q       <= (others => '0');
+    asked_d        <= u_pi_d;
+    asked_q        <= u_pi_q;
+    turned_d       <= o.u_dec_d;
+    turned_q       <= o.u_dec_q;
   end generate by_mode;
 
   speed_regulator : entity work.speed_pi

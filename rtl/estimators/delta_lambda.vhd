@@ -8,8 +8,8 @@
 -- One pipeline for both results: d, then q a clock later.
 -- Formats: r U(0,24), u_int, left and the differences 28 fraction bits, factor S(0,17), out FLUX.
 -- Latency: 12 (d, then q).  Interval: 12.
--- Rounding: half up after r*i, the fading, the shift and the factor.  The shifted difference saturates, which is reported unless
--- the factor is zero.  The other results fit: |r*i| < 2 and |factor| < 1.
+-- Rounding: half up after r*i, the fading, the shift and the factor.  The shifted difference saturates, which is
+-- reported unless the factor is zero.  The other results fit: |r*i| < 2 and |factor| < 1.
 
 library ieee;
 use ieee.std_logic_1164.all;
