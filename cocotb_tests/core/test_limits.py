@@ -39,10 +39,10 @@ def test_wrong_angle_is_a_runaway(rpm, turned):
     """
     offset = SET.values.theta_offset + round(turned * QUARTER)
     changes = {"theta_offset": offset % (4 * QUARTER)}
-    device, early = play(1300, rpm, changes=changes)
-    assert first(device) == ["encoder_lost"] and not device.running[-1]
-    device, result = play(1300, rpm, changes=changes | {"emf_samples": 0})
-    assert first(device) == ["runaway"] and not device.running[-1]
+    early = play(1300, rpm, changes=changes)
+    assert first(early) == ["encoder_lost"] and not early.running[-1]
+    result = play(1300, rpm, changes=changes | {"emf_samples": 0})
+    assert first(result) == ["runaway"] and not result.running[-1]
     assert np.abs(early.plant["omega_m"]).max() < 0.5 * np.abs(result.plant["omega_m"]).max()
     assert np.abs(result.plant["omega_m"]).max() < DRIVE.machine.rated_speed_rad_s / 3
     assert np.abs(result.plant["i_a"]).max() < 2.0 * DRIVE.current_limit_a
@@ -50,19 +50,19 @@ def test_wrong_angle_is_a_runaway(rpm, turned):
 
 def test_right_angle_off_is_a_stall():
     """90 degrees off: all current in the d axis, no torque."""
-    device, result = play(700, 300.0, changes={"theta_offset": QUARTER, "stall_samples": 500})
-    assert first(device) == ["stall"] and np.abs(result.plant["omega_m"]).max() < 1.0
+    result = play(700, 300.0, changes={"theta_offset": QUARTER, "stall_samples": 500})
+    assert first(result) == ["stall"] and np.abs(result.plant["omega_m"]).max() < 1.0
 
 
 @pytest.mark.parametrize("sign", [slowly(1), -1])
 def test_torque_mode_without_load_ends_in_overspeed(sign):
-    device, result = play(2000, i_q=sign * 1.0, start_rpm=sign * 3500.0)
-    assert first(device) == ["overspeed"] and not device.running[-1]
+    result = play(2000, i_q=sign * 1.0, start_rpm=sign * 3500.0)
+    assert first(result) == ["overspeed"] and not result.running[-1]
     rated = DRIVE.machine.rated_speed_rad_s
     assert np.abs(result.plant["omega_m"]).max() < 1.25 * rated
     limit, speed = SET.values.omega_trip << 8, np.abs(result.observed["omega_me"])
     beyond = int(np.flatnonzero(speed >= limit + 1)[0])
-    assert device.running[beyond] and not any(device.running[beyond + 3 :])
+    assert result.running[beyond] and not any(result.running[beyond + 3 :])
 
 
 @pytest.mark.parametrize("i_d", [slowly(12.0), -12.0])
@@ -70,9 +70,9 @@ def test_torque_mode_without_load_ends_in_overspeed(sign):
 def test_current_stays_in_its_circle(i_d, i_q):
     """i_d_ref of 12 A with a limit of 7.1 A, alone and with i_q_ref beside it."""
     limit = from_si("i_d_ref", 7.1, DRIVE)
-    device, result = play(1000, 600.0, i_d=i_d, i_q=i_q, changes={"i_max": limit, "i_trip": 511})
+    result = play(1000, 600.0, i_d=i_d, i_q=i_q, changes={"i_max": limit, "i_trip": 511})
     o = result.observed
-    assert told(device) == []
+    assert told(result) == []
     settled = slice(300, None)
     assert abs(np.hypot(o["i_d"], o["i_q"])[settled].mean() - limit) < 0.01 * limit
     assert np.abs(np.hypot(result.plant["i_d"], result.plant["i_q"])[settled]).mean() < 7.1 * 1.01
@@ -94,35 +94,35 @@ def test_offset_of_a_sensor_is_named_before_the_gates_switch(phase):
     """0.1 A at rest, gates off: enable has no effect, current_offset is named; a right zero starts."""
     name = f"offset_{'abc'[phase]}"
     wrong = {name: getattr(SET.values, name) + round(0.1 / 12.5 * 32768)}
-    device, _ = play(120, 300.0, changes=wrong, off=80)
-    assert first(device) == ["current_offset"] and not any(device.running)
-    device, _ = play(120, 300.0, off=80)
-    assert device.running[-1] and told(device) == []
+    result = play(120, 300.0, changes=wrong, off=80)
+    assert first(result) == ["current_offset"] and not any(result.running)
+    result = play(120, 300.0, off=80)
+    assert result.running[-1] and told(result) == []
 
 
 def test_ordinary_operation_does_not_trip():
     """Reversals at full torque, load steps at rest and at speed, a stop: nothing is told."""
     rpm = np.repeat([0.0, 1500.0, -1500.0, 100.0, -100.0, 0.0], 900)
     load = np.repeat([0.0, 0.0, 0.0, 3.7, -3.7, 3.7], 900)
-    device, result = play(len(rpm), rpm, load=load)
-    assert told(device) == [] and device.running[-1]
+    result = play(len(rpm), rpm, load=load)
+    assert told(result) == [] and result.running[-1]
     assert np.abs(result.plant["omega_m"]).max() > 1400 * RPM
 
 
 def test_a_load_that_drives_the_shaft_away_is_a_runaway():
     """More load than the limit of the current holds: the shaft is driven against its reference."""
-    device, _ = play(1500, 300.0, load=9.0)
-    assert first(device) == ["runaway"]
+    result = play(1500, 300.0, load=9.0)
+    assert first(result) == ["runaway"]
 
 
 def test_a_stall_trips_unless_it_is_ignored():
     changes = {"stall_samples": 300, "fault_ignore": SET.values.fault_ignore | 1 << NAMES.index("stall")}
     blocked = dict(rpm=1000.0, load=0.0, changes=changes)
     scenario = dict(periods=900, **blocked)
-    device, _ = play_blocked(**scenario)
-    assert told(device) == ["stall"] and device.running[-1]
-    device, _ = play_blocked(**scenario | {"changes": changes | {"fault_ignore": 0}})
-    assert first(device) == ["stall"] and not device.running[-1]
+    result = play_blocked(**scenario)
+    assert told(result) == ["stall"] and result.running[-1]
+    result = play_blocked(**scenario | {"changes": changes | {"fault_ignore": 0}})
+    assert first(result) == ["stall"] and not result.running[-1]
 
 
 def play_blocked(periods, rpm, load, changes):

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fluxproof.cosim.board_clock import BoardClock, GoldenBlocks, State, Wires, core_clock
+from fluxproof.cosim.golden_clock import inputs_of
 from golden_model.generated.register_names import ADDRESSES
 from golden_model.io import register_map
 from golden_model.kernel import kernel
@@ -97,7 +98,9 @@ def run_clocks(state, inputs, regs, b, pins, carrier_half, trip_filter, until_id
     for k in range(len(pins)):
         if k > 0 and until_idle and not state.of_core.sample_busy:
             return state, k, 0, given
-        state, given, entered, core, off = one_clock(state, inputs, regs, b, pins[k], carrier_half, trip_filter)
+        state, given, entered, core, off = one_clock(
+            state, inputs_of(inputs[k]), regs, b, pins[k], carrier_half, trip_filter
+        )
         x = seen[k]
         x[0], x[1] = 0 if off else given.gate_high, 0 if off else given.gate_low
         x[2], x[3], x[4] = given.trigger, state.wires.irq, core.brake
@@ -140,9 +143,9 @@ class AxiClock(BoardClock):
         seen, _ = self.advance(np.stack([given[name] for name in PINS], axis=1))
         return given | bus_of(known, length), seen
 
-    def _run(self, pins: np.ndarray, waits: bool, seen: np.ndarray, status: np.ndarray):
+    def _run(self, inputs: np.ndarray, pins: np.ndarray, waits: bool, seen: np.ndarray, status: np.ndarray):
         del status  # no front ends, whose registers it would hold
         return run_clocks(
-            self.state, self.inputs, self._settings(), self._board(), pins, self.blocks.core.carrier_half,
+            self.state, inputs, self._settings(), self._board(), pins, self.blocks.core.carrier_half,
             self.blocks.trip_filter, waits, seen,
         )  # fmt: skip

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fluxproof.cosim.golden_clock import Due, arrive, inputs_of, rows_of
 from golden_model import clocked, fluxproof
 from golden_model.common import input_filter
 from golden_model.converters import current_front
@@ -256,7 +257,7 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
 
 @kernel
 def run_clocks(state, inputs, regs, b, pins, carrier_half, config, until_idle, seen, status):
-    """Clocks with the pins of each row until a sample enters or, with ``until_idle``, none is in flight any more.
+    """A clock for each row of ``pins`` and ``inputs`` until a sample enters or, with ``until_idle``, none is in flight.
 
     Returns (state, clocks made, whether a sample has entered at the last, the wires that it entered with).
     """
@@ -267,7 +268,7 @@ def run_clocks(state, inputs, regs, b, pins, carrier_half, config, until_idle, s
             return state, k, 0, before
         before = state.wires
         state, entered, core, position, converters, board, snapshot, off = one_clock(
-            state, inputs, regs, b, pins[k], carrier_half, config
+            state, inputs_of(inputs[k]), regs, b, pins[k], carrier_half, config
         )
         x = seen[k]
         x[0], x[1] = 0 if off else before.gate_high, 0 if off else before.gate_low
@@ -325,7 +326,7 @@ class BoardClock:
         self.samples = 0
         self.history: list[tuple[fluxproof.Sample, fluxproof.Observed]] = []  # of the samples
         self.strobes: list[int] = []  # the clocks at which they entered
-        self._due: list[tuple[int, dict[str, int]]] = []
+        self._due: list[Due] = []
         self._writes: list[tuple[int, str, int]] = []
         self._taken: list[tuple[int, str, int]] = []  # registers that change, and host_write with them
 
@@ -342,10 +343,11 @@ class BoardClock:
         at = 0
         while at < len(pins):
             waits = self._take_writes()
-            stops = [when - self.clock for when, *_ in (*self._due, *self._writes, *self._taken) if when > self.clock]
+            stops = [when - self.clock for when, *_ in (*self._writes, *self._taken) if when > self.clock]
             length = min([len(pins) - at, *stops])
             part = slice(at, at + length)
-            self.state, made, entered, wires = self._run(pins[part], waits, seen[part], status[part])
+            inputs = rows_of(self.inputs, self._due, self.clock, length)
+            self.state, made, entered, wires = self._run(inputs, pins[part], waits, seen[part], status[part])
             references = [self.registers.values[name] for name in REFERENCES]
             self.clock += made
             at += made
@@ -354,10 +356,10 @@ class BoardClock:
                 self._enter(wires, references)
         return seen, status
 
-    def _run(self, pins: np.ndarray, waits: bool, seen: np.ndarray, status: np.ndarray):
+    def _run(self, inputs: np.ndarray, pins: np.ndarray, waits: bool, seen: np.ndarray, status: np.ndarray):
         """Clocks as in ``run_clocks``."""
         return run_clocks(
-            self.state, self.inputs, self._settings(), self._board(), pins, self.blocks.core.carrier_half,
+            self.state, inputs, self._settings(), self._board(), pins, self.blocks.core.carrier_half,
             self.config, waits, seen, status,
         )  # fmt: skip
 
@@ -373,10 +375,7 @@ class BoardClock:
 
     def _take_due(self) -> None:
         """Results of a sample and registers that change with the clock that has passed."""
-        for when, values in self._due:
-            if when == self.clock:
-                self.inputs = self.inputs._replace(**values)
-        self._due = [due for due in self._due if due[0] > self.clock]
+        self.inputs, self._due = arrive(self.inputs, self._due, self.clock)
         taken, self._taken = self._taken, [write for write in self._taken if write[0] > self.clock]
         for when, name, value in taken:
             if when > self.clock:

@@ -7,7 +7,7 @@ the declared latencies.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -16,14 +16,47 @@ from golden_model.control.reference_table import BLANK
 from golden_model.kernel import kernel
 
 SEEN = clocked.Seen._fields
+COLUMN = {name: k for k, name in enumerate(clocked.Inputs._fields)}
+Due = tuple[int, Mapping[str, int]]  # values of a sample and the clock from which on they are valid
+
+
+def rows_of(inputs: clocked.Inputs, due: Iterable[Due], clock: int, count: int) -> np.ndarray:
+    """The inputs of ``count`` clocks from ``clock`` on, one row each, with what is due in them; see inputs_of."""
+    rows = np.empty((count, len(COLUMN)), np.int64)
+    rows[:] = inputs
+    for at, values in due:
+        for name, value in values.items():
+            rows[max(at - clock, 0) :, COLUMN[name]] = value
+    return rows
+
+
+@kernel
+def inputs_of(x):
+    """A row of rows_of by names."""
+    # Unpacked, because a star compiles only for a tuple; int for the same types where it runs as plain Python.
+    return clocked.Inputs(
+        int(x[0]), int(x[1]), int(x[2]), int(x[3]), int(x[4]), int(x[5]), int(x[6]), int(x[7]),
+        int(x[8]), int(x[9]), int(x[10]), int(x[11]), int(x[12]), int(x[13]), int(x[14]), int(x[15]),
+    )  # fmt: skip
+
+
+assert len(COLUMN) == 16  # a field with a default that inputs_of does not give would always be 0
+
+
+def arrive(inputs: clocked.Inputs, due: list[Due], clock: int) -> tuple[clocked.Inputs, list[Due]]:
+    """(the inputs with what is due by ``clock``, what is due later)."""
+    for at, values in due:
+        if at <= clock:
+            inputs = inputs._replace(**values)
+    return inputs, [(at, values) for at, values in due if at > clock]
 
 
 @kernel
 def run_clocks(state, inputs, regs, carrier_half, until_trigger, seen):
-    """Clocks with the same inputs, one row of ``seen`` each: (state, clocks made, whether the last took a sample)."""
+    """A clock for each row of ``inputs`` and ``seen``: (state, clocks made, whether the last took a sample)."""
     entered = 0
     for k in range(seen.shape[0]):
-        state, entered, now = clocked.step(state, inputs, regs, carrier_half)
+        state, entered, now = clocked.step(state, inputs_of(inputs[k]), regs, carrier_half)
         row = seen[k]  # unpacked, because a loop compiles to a hundred times as much code
         row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9] = now
         if until_trigger and now.sample_trigger:
@@ -42,7 +75,7 @@ class GoldenClock:
         self.running = 0
         self.samples: list[fluxproof.Sample] = []  # accepted samples
         self.observed: fluxproof.Observed | None = None  # values of the last accepted sample
-        self._due: list[tuple[int, dict[str, int]]] = []
+        self._due: list[Due] = []
 
     def advance(
         self, clocks: int, sample: Mapping[str, int] | None = None, until_trigger: bool = False, **pins: int
@@ -55,16 +88,12 @@ class GoldenClock:
         self.inputs = self.inputs._replace(**pins)
         rows, left = [], clocks
         while left:
-            for at, values in self._due:
-                if at == self.clock:
-                    self.inputs = self.inputs._replace(**values)
-            self._due = [due for due in self._due if due[0] > self.clock]
             strobe = sample is not None and left == clocks
-            length = 1 if strobe else min([left, *(at - self.clock for at, _ in self._due)])
+            length = 1 if strobe else left
             seen = np.zeros((length, len(SEEN)), np.int64)
             self.state, made, entered = run_clocks(
                 self.state,
-                self.inputs._replace(sample_valid=int(strobe)),
+                rows_of(self.inputs._replace(sample_valid=int(strobe)), self._due, self.clock, length),
                 self.registers,
                 self.config.carrier_half,
                 until_trigger,
@@ -73,6 +102,7 @@ class GoldenClock:
             if entered and sample is not None:
                 self._enter(sample)
             self.clock += made
+            self.inputs, self._due = arrive(self.inputs, self._due, self.clock)
             left -= made
             self.running = int(seen[made - 1, SEEN.index("running")])
             rows.append(seen[:made])
