@@ -15,7 +15,6 @@ from cocotb_tests.support.recordings.bench_logs import GRID, Truth, table
 from cocotb_tests.support.recordings.from_equations import nominal_of, write
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.conventions.table import READINGS
-from fluxproof.diagnosis.decide.interpretation import is_simpler
 from fluxproof.diagnosis.effects.drive_file import restated
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.ground.recording import Recording
@@ -24,6 +23,7 @@ from fluxproof.diagnosis.inference.problem import Problem
 from fluxproof.diagnosis.inference.search import search
 from fluxproof.diagnosis.inference.setup import Setup
 from fluxproof.diagnosis.interpret import judge
+from fluxproof.diagnosis.interpret.mistake import is_simpler
 from fluxproof.diagnosis.loading.load import load_recording
 from fluxproof.diagnosis.physics import rows_of, view_and_held
 from fluxproof.diagnosis.plan.request import requests

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What decides whether recording or drive file are asserted to mean something else than documented.
+"""Whether it is asserted that recording or drive file mean something else than documented: if that explains enough.
 
-interpret/ finds the interpretation that fits best.  It is a mistaken convention and no coincidence if it is met exactly
-and replaces effects (``is_exact``, ``is_simpler``), and it is asserted if it explains enough (``under``).
+interpret/ judges which interpretation the data prefer, and whether it is a mistake and no coincidence.
 """
 
 from __future__ import annotations
@@ -12,32 +11,10 @@ from dataclasses import replace
 
 from fluxproof.diagnosis.decide.decision import Decision
 from fluxproof.diagnosis.decide.verdict import kind_as_interpreted
-from fluxproof.diagnosis.effects.constant import rescaled
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.result import Evidence, Fit, Remainder
 
 OF_THE_REST = ("after", "noise", "spectrum_after")  # arrays of the evidence in true volts
-
-
-def is_exact(readings, left, effects) -> bool:
-    """Whether no effect that is still needed rescales a quantity that an interpretation rescales already.
-
-    Currents in rms that still need a gain error of a few per cent are a gain error by chance near that factor.
-    """
-    return not any(rescaled(effects[n]) & r.touches for n in left for r in readings)
-
-
-def is_simpler(readings, left, most, absurd) -> bool:
-    """Whether the interpretations, and the effects ``left`` beside them, are no more than ``most`` effects without.
-
-    Other pole pairs scale L_d, L_q and psi: instead of one effect of a plausible size they would be chance; absurd:
-    whether the effects without an interpretation have sizes outside of what is plausible.  Two factors that are met
-    exactly are one constant that is off: voltages and R, L at twice are a magnet flux at half, which is one mistake.
-    So several interpretations must replace more effects than they are.
-    """
-    cost = sum(1 + bool(r.pole_pairs and not absurd) for r in readings)
-    several = len(readings) > 1  # each factor is one point of a free size: so many of them must replace more effects
-    return len(left) + cost + several <= most or (absurd and not left)
 
 
 def under(readings, rivals, documented: Decision, found: Decision, level: float) -> Decision:

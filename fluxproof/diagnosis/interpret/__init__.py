@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Did the file mean something else?  judge.py finds what the data prefer; decide/interpretation.py accepts it."""
+"""Did the file mean something else?  judge.py finds what the data prefer."""

@@ -20,7 +20,6 @@ import numpy as np
 from fluxproof.diagnosis.balance.misfit import bulge
 from fluxproof.diagnosis.conventions.reading import Reading
 from fluxproof.diagnosis.conventions.table import pole_pairs_for, readings_for
-from fluxproof.diagnosis.decide.interpretation import is_exact, is_simpler
 from fluxproof.diagnosis.effects import torque_of
 from fluxproof.diagnosis.effects.constant import is_of_nameplate
 from fluxproof.diagnosis.ground import constants as k
@@ -34,6 +33,7 @@ from fluxproof.diagnosis.inference.points import condense
 from fluxproof.diagnosis.inference.problem import Problem
 from fluxproof.diagnosis.inference.search import search
 from fluxproof.diagnosis.inference.setup import Setup
+from fluxproof.diagnosis.interpret.mistake import is_exact, is_simpler
 
 WIDE = 6  # readings to which a second one is added
 SEARCHED = 2  # readings, or pairs of them, that are judged with the whole search
@@ -52,7 +52,7 @@ class Judged:
 def preferred(recordings, posterior, explained, progress=lambda text: None):
     """(readings, rivals, Posterior) that the data prefer; without readings if what is documented fits best.
 
-    An interpretation that is not met exactly, or replaces no effect (decide/interpretation.py), is rejected.  rivals:
+    An interpretation that is not met exactly, or replaces no effect (mistake.py), is rejected.  rivals:
     readings that leave the same balance; posterior: of the effects as documented; explained: whether these explain the
     misfit.
     """
