@@ -38,7 +38,7 @@ def plan(block: Block, index: int, seed: int) -> Bench:
     rows = [
         Row(
             number,
-            tuple(rules[number].strobes.items()),
+            rules[number].strobes,
             tuple((name, int(value)) for name, value in rules[number].outputs),
             rules[number].still,
             rules[number].of_sample,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,17 +20,19 @@ from golden_model.block import Block, Port
 SETTLED = 2  # strobes are compared after this clock
 
 
-@dataclass
-class Due:
+NOTHING: Mapping[str, int] = {}
+
+
+class Due(NamedTuple):
     """What a bench compares before a clock's rising edge; the inputs are still those of the clock before."""
 
-    strobes: dict[str, int] = field(default_factory=dict)  # out_valid, out_soon
-    outputs: list[tuple[str, int]] = field(default_factory=list)
-    still: bool = False  # every output is as it was before the edge of the clock before
-    of_sample: int = -1
+    strobes: tuple[tuple[str, int], ...]  # out_valid, out_soon
+    outputs: tuple[tuple[str, int], ...]
+    still: bool  # every output is as it was before the edge of the clock before
+    of_sample: int
 
 
-@dataclass
+@dataclass(slots=True)
 class Clock:
     """One clock: what is driven before its rising edge, and what must be seen before the next one."""
 
@@ -39,8 +42,8 @@ class Clock:
     sample: int = -1  # index of the sample that enters here
     out_valid: int = 0
     of_sample: int = -1  # index of the sample whose outputs are due here
-    expected: dict[str, int] = field(default_factory=dict)
-    soon: dict[str, int] = field(default_factory=dict)  # outputs due with out_soon
+    expected: Mapping[str, int] = field(default_factory=lambda: NOTHING)
+    soon: Mapping[str, int] = field(default_factory=lambda: NOTHING)  # outputs due with out_soon
 
 
 def following(draw: Samples, state) -> Sample | None:
@@ -120,29 +123,33 @@ def due(block: Block, clocks: list[Clock]) -> list[Due]:
     Strobes are compared from the fourth clock on, in every one of them: the reset has two clocks to work.  Outputs are
     compared with ``out_valid``, and again before the next sample or a reset if nothing was in flight: they must stay.
     """
-    strobes = block.strobes and not block.clocked
-    entries, last, left = [], -1, {}
+    strobed = block.strobes and not block.clocked
+    entries, last, left = [], -1, NOTHING
+    after_reset = True  # before the first clock nothing was seen, and a reset may leave anything behind
     for number, clock in enumerate(clocks):
-        entry = Due(of_sample=clock.of_sample)
-        if strobes and number > SETTLED:
-            entry.strobes["out_valid"] = clock.out_valid
+        strobes, outputs = (), []
+        if strobed and number > SETTLED:
+            strobes = (("out_valid", clock.out_valid),)
             if block.soon:
-                entry.strobes["out_soon"] = int(bool(clock.soon))
-                entry.outputs += clock.soon.items()
-        # Before the first clock nothing was seen, and a reset may leave anything behind.
-        entry.still = block.atomic and not clock.out_valid and number > 0 and not clocks[number - 1].rst
-        if strobes and clock.out_valid and clock.of_sample == last:
+                strobes += (("out_soon", int(bool(clock.soon))),)
+                outputs += clock.soon.items()
+        still = block.atomic and not clock.out_valid and not after_reset
+        if strobed and clock.out_valid and clock.of_sample == last:
             left = clock.expected
-        elif clock.in_valid or clock.rst:
-            entry.outputs += left.items()
+        elif left and (clock.in_valid or clock.rst):
+            outputs += left.items()
         if clock.in_valid or clock.rst:
-            last, left = clock.sample, {}
-        for name, value in clock.expected.items():
-            shown = block.shown_with.get(name)
-            if shown is None or clock.expected.get(shown, 1):
-                entry.outputs.append((name, value))
-        entries.append(entry)
+            last, left = clock.sample, NOTHING
+        if clock.expected:
+            outputs += _shown(block, clock.expected) if block.shown_with else clock.expected.items()
+        entries.append(Due(strobes, tuple(outputs), still, clock.of_sample))
+        after_reset = bool(clock.rst)
     return entries
+
+
+def _shown(block: Block, expected: Mapping[str, int]) -> list[tuple[str, int]]:
+    """The outputs that mean something now: some do only beside another one that is set."""
+    return [(name, value) for name, value in expected.items() if expected.get(block.shown_with.get(name, ""), 1)]
 
 
 def _clocked_schedule(block: Block, config: Mapping[str, int], seed: int, length: Length) -> list[Clock]:

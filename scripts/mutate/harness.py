@@ -67,7 +67,7 @@ def block_trial(block: Block, config, seed: int) -> Trial:
             if held.get(name) != value:
                 writes.extend((at, number[name], value))
         held |= driven
-        for name, value in (*rule.strobes.items(), *rule.outputs):
+        for name, value in (*rule.strobes, *rule.outputs):
             checks.extend((at, number[name], value))
         still += [at] * rule.still
     kept = [number[p.name] for p in block.out_ports(config)]
