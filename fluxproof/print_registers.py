@@ -8,15 +8,17 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from pathlib import Path
 
 from fluxproof.diagnosis.whole_drive import flux_of, load_drive
 from fluxproof.files import refuse_overwriting, write_json
-from fluxproof.quote import c_comment, put
+from fluxproof.quote import c_comment, put, say
 from fluxproof.stage import alone
 from golden_model import torque_table
 from golden_model.board_registers import board_generics, board_set, has_board, pin_generics
 from golden_model.drive import Drive
+from golden_model.drive_checks import doubts
 from golden_model.drive_keys import DriveError
 from golden_model.generated.register_names import ADDRESSES
 from golden_model.registers import RegisterSet, Row
@@ -50,6 +52,8 @@ def run(args: argparse.Namespace) -> int:
         result = board_set(drive, flux_of(args.flux_map, drive))
     except DriveError as error:
         raise DriveError(f"{args.drive}: {error}") from None
+    for doubt in doubts(drive):
+        say(f"fluxproof: {args.drive}: warning: {doubt}", sys.stderr)
     if args.json:
         refuse_overwriting([args.json], [args.drive, *([args.flux_map] if args.flux_map else [])])
         with alone(Path(args.json)) as file:

@@ -14,6 +14,7 @@ from golden_model.protection_limits import default_u_dc_max_v, regen_end_v
 CARRIER_HALF_RANGE = (8, 32767)  # generic CARRIER_HALF of rtl/fluxproof.vhd
 ON_OF_DEAD, ON_S = 0.05, 20e-9  # shortest time that a switch is on: of the dead time, and at least
 TURN_SAMPLES = 4.0 * math.pi  # register t_s is a fraction of half a radian at the base of the speed
+LEAST_MARGIN_DEG = 30.0  # of the current loop; with less it rings
 WHOLE = 1e-6  # relative; a decimal fraction with seven digits counts as exact
 
 
@@ -51,6 +52,11 @@ def _carrier(drive):
     exact = clock / (2.0 * pwm)
     keys = f"[core] clock_hz = {clock:g} and [inverter] pwm_frequency_hz = {pwm:g}"
     lo, hi = CARRIER_HALF_RANGE
+    if exact < lo:
+        least = 2.0 * lo * pwm
+        raise DriveError(
+            f"{keys}: a PWM period has {2.0 * exact:.3g} clocks: allowed is clock_hz above {least:g}, in Hz"
+        )
     if not lo <= exact <= hi or abs(exact / round(exact) - 1.0) > WHOLE:
         around = {min(max(half, lo), hi) for half in (math.ceil(min(exact, hi)), math.floor(min(exact, hi)))}
         nearest = " and ".join(f"{clock / (2.0 * half):.7g} Hz" for half in sorted(around, reverse=True))
@@ -222,6 +228,19 @@ def _current_loop(drive):
         reason = f"{delay / drive.sample_time_s:g} samples of delay make the loop unstable from there"
         limit = 1.0 / four_delays
         _refuse("[control] current_bandwidth_hz", asked, f"below {limit:g} Hz; {reason}")
+
+
+def doubts(drive):
+    """Sentences on what is allowed and yet hardly wanted: a current loop that rings."""
+    asked, delay = drive.control.current_bandwidth_hz, drive.sampling_to_voltage_s
+    margin, most = 90.0 - 360.0 * asked * delay, (90.0 - LEAST_MARGIN_DEG) / 360.0 / delay if delay else math.inf
+    if asked <= most or drive.control.current_kp_q_v_per_a is not None:
+        return []
+    return [
+        f"[control] current_bandwidth_hz = {asked:g} leaves {margin:.0f} degrees of phase margin at "
+        f"{delay / drive.sample_time_s:g} samples of delay: the current rings; at most {most:.4g} Hz leave "
+        f"{LEAST_MARGIN_DEG:g} degrees"
+    ]
 
 
 def _flux_loop(drive):

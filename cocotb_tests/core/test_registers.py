@@ -9,8 +9,12 @@ import numpy as np
 import pytest
 
 from cocotb_tests.support.drives import PAPER, each_drive, edited, row_of
+from fluxproof.checkout import DRIVES
+from fluxproof.command import main
 from fluxproof.plant import Machine, machine_params
 from golden_model.drive import SECTIONS, load, with_carrier
+from golden_model.drive_checks import doubts
+from golden_model.drive_keys import DriveError
 from golden_model.fluxproof import OBSERVED, REGISTERS, Registers
 from golden_model.registers import registers
 from golden_model.scaling import ROUND_UP, base_keys
@@ -110,6 +114,22 @@ def test_machine_section_builds_the_plants_machine():
     assert {f.name for f in dataclasses.fields(SECTIONS["machine"])} - names == extra
     params = machine_params(Machine.from_mapping(dataclasses.asdict(load(PAPER).machine)))
     assert (params.inductance_d, params.magnet_flux) == (16.07e-3, 0.165)
+
+
+def test_a_current_loop_that_rings_is_told(tmp_path, capsys):
+    """At 1.5 samples of delay 30 degrees are left at a ninth of the sampling frequency; the files here are quiet."""
+    path = edited(tmp_path, "control", "current_bandwidth_hz = 1200")
+    assert main(["registers", str(path)]) == 0
+    said = capsys.readouterr().err
+    assert "current_bandwidth_hz = 1200 leaves 25 degrees of phase margin at 1.5 samples" in said and "1111 Hz" in said
+    assert not any(doubts(load(file)) for file in DRIVES.glob("*.toml"))
+    path.write_text(path.read_text().replace("[control]", "[control]\ncurrent_kp_q_v_per_a = 10"))
+    assert not doubts(load(path)), "a given gain has another crossover"
+
+
+def test_a_clock_in_mhz_is_told_by_the_clock_that_it_needs(tmp_path):
+    with pytest.raises(DriveError, match=r"a PWM period has 0.02 clocks: allowed is clock_hz above 160000, in Hz"):
+        load(edited(tmp_path, "core", "clock_hz = 200"))
 
 
 def test_keys_name_where_a_base_comes_from(tmp_path):

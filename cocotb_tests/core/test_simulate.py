@@ -151,7 +151,11 @@ def test_trip(tmp_path, capsys):
     status, data, _, err = run(tmp_path, capsys, path)
     assert status == 1 and data["status"] == "tripped"
     assert re.search(r"tripped by overcurrent at [\d.]+ ms, in the stage '", err)
-    assert data["figures"]["Currents"]["i_q_tracking_reversal"]["value"] == 0.0  # off: reference and current are zero
+    off = [data["figures"][group] for group in ("Speed", "Currents", "Voltage and power", "Heat")]
+    told = ("load_dip", "speed_error_reversal", "i_q_tracking_reversal", "ripple_rms", "voltage_used_reversal")
+    found = {name: value["value"] for group in off for name, value in group.items()}
+    assert all(found[name] is None for name in (*told, "copper_loss_in_the_run")), "figures of gates that are off"
+    assert found["current_overshoot"] is not None, "this run has not tripped"
 
 
 def test_the_gates_come_on_a_turning_shaft_as_in_a_drive():

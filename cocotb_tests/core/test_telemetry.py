@@ -26,6 +26,7 @@ from fluxproof.diagnosis.ground.recording import RecordingError
 from fluxproof.diagnosis.replay import digital
 from fluxproof.diagnosis.replay.capture import capture as golden_capture
 from fluxproof.diagnosis.replay.capture import packets
+from fluxproof.diagnosis.replay.telemetry import MAGIC
 from fluxproof.diagnosis.replay.telemetry_stream import SIZE, parse, read_capture, write_piece
 from golden_model import drive as drives
 from golden_model import fluxproof
@@ -262,6 +263,7 @@ def test_files_that_are_no_capture_are_refused(golden, tmp_path, capsys):
     for content, wanted in (
         (b"", "0 bytes are too few for a telemetry packet"),
         (raw(words[0])[:-1], "95 bytes are too few for a telemetry packet"),
+        (MAGIC + rng.bytes(500), "this is a dump already, which `fluxproof diagnose` reads"),
         (rng.bytes(5000), f"no word 0x{HEADER_WORD:08x}"),
         (
             b"\0" * 9 + raw(other),

@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 
+import numpy as np
 import pytest
 
 from cocotb_tests.support.drives import PAPER
@@ -18,7 +20,8 @@ from fluxproof.command import main
 from fluxproof.diagnosis.ground.plant_section import plant_of
 from fluxproof.diagnosis.replay import digital
 from fluxproof.hil.load import erase_words, load_words
-from fluxproof.plant import Bus
+from fluxproof.plant import Bus, FluxMap
+from fluxproof.project import hil
 from golden_model import drive as drives
 from golden_model.drive_keys import DriveError
 from golden_model.front_ends import Encoder
@@ -27,6 +30,7 @@ from golden_model.io.register_map import OKAY
 
 HALF = 1700  # clocks of half a period: a step of the motor is 0.5 us; with 1/J of this shaft no longer one fits
 RPM = 9.549297
+GRID = np.mgrid[:3, :3].reshape(2, 9).astype(float)
 LOADED, PACKET_BYTES = 40, 96  # packets until bring_up.c has loaded the registers
 
 
@@ -55,6 +59,7 @@ def test_every_word_of_a_motor_fits_its_register(drive):
     [
         ({"sensors": {"eccentricity_once_rad": 0.01}}, r"\[plant.sensors\] eccentricity_once_rad = 0.01"),
         ({"machine": {"iron_conductance_s": 1e-4}}, r"\[plant.machine\] iron_conductance_s = 0.0001"),
+        ({"machine": {"flux_map": FluxMap.from_points(*GRID, *GRID)}}, r"\[plant.machine\] flux_map"),
         ({"machine": {"inertia_kgm2": 1e-7}}, r"motor: k_j = .* does not fit"),
     ],
 )
@@ -66,6 +71,36 @@ def test_what_the_motor_does_not_have_is_refused(drive, changes, said):
         load_words(drive, *parts.values())
     with pytest.raises(DriveError, match=r'\[encoder\] kind = "biss"'):
         load_words(dataclasses.replace(drive, encoder=Encoder("biss")), plant.machine, plant.inverter, plant.sensors)
+
+
+def words_of(tmp_path, *lines: str) -> dict[str, int]:
+    """The last word of each register in motor_registers.h of paper001 with further lines of [plant.*]."""
+    file = tmp_path / "drive.toml"
+    file.write_text("\n".join([PAPER.read_text(), *lines]))
+    text = hil.header(str(file), drives.with_carrier(drives.load(file), HALF))
+    return {name: int(value) for value, name in re.findall(r"(-?\d+)\}, /\* (\w+)", text)}
+
+
+def test_temperatures_and_filter_of_a_drive_file(tmp_path):
+    """A hot motor without bodies is one of other values; with bodies the registers let it warm from there."""
+    cold = words_of(tmp_path)
+    assert cold["motor_k_filter"] == cold["motor_heating"] == cold["motor_tcr_winding"] == 0
+    hot = ["[plant.machine]", "temperature_winding_c = 80", "temperature_magnet_c = 80"]
+    hot += ["resistance_temp_coeff_per_k = 0.004", "magnet_temp_coeff_per_k = -0.001"]
+    still = words_of(tmp_path, *hot)
+    assert still["motor_r_a"] / cold["motor_r_a"] == pytest.approx(1.24, rel=1e-5)
+    assert still["motor_psi_m"] / cold["motor_psi_m"] == pytest.approx(0.94, rel=1e-5)
+    assert still["motor_tcr_winding"] == 0 and still["motor_ambient"] == 80 << 6
+    bodies = ["[plant.hil]", "winding_j_per_k = 100", "winding_s = 60", "magnet_s = 90", "current_filter_s = 5e-6"]
+    warm = words_of(tmp_path, *hot, *bodies)
+    assert all(warm[f"motor_{name}"] == cold[f"motor_{name}"] for name in ("r_a", "psi_m"))
+    assert warm["motor_psi_start"] == still["motor_psi_m"] and warm["motor_ambient"] == 80 << 6
+    assert all(warm[f"motor_{name}"] for name in ("heating", "k_winding", "k_magnet", "tcr_winding", "tcr_magnet"))
+    assert warm["motor_k_filter"] * 2**-17 == pytest.approx(-math.expm1(-17 / 34e6 / 5e-6), rel=1e-4)
+    with pytest.raises(DriveError, match=r"\[plant.hil\] needs winding_s, magnet_s as well"):
+        words_of(tmp_path, *bodies[:2])
+    with pytest.raises(DriveError, match=r"temperature_magnet_c = 60 beside temperature_winding_c = 80"):
+        words_of(tmp_path, *hot[:2], "temperature_magnet_c = 60", *bodies)
 
 
 @pytest.mark.slow

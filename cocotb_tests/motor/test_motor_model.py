@@ -32,7 +32,7 @@ from golden_model.formats import FLUX, MOTOR_FLUX, MOTOR_LEG, MOTOR_VOLTAGE, PU
 from golden_model.motor import motor_bus, motor_filter, motor_flux, motor_heat, motor_legs, motor_model, motor_shaft
 from golden_model.motor.motor_heat import HEATING, SHARE
 from golden_model.motor.motor_model import Shown
-from studies.hil import closed_loop, commissioning, equal, golden, residual
+from studies.hil import closed_loop, commissioning, equal, golden, in_ghdl, residual
 from studies.hil.beside_plant import HELD, OWN, beside_plant, follow
 from studies.hil.drive import CLOCK_HZ, CURRENT_A, SERVO, SWITCHES, U_DC_V, ride, servo
 from studies.hil.plant import ANGLE_DEG, CURRENT_PERCENT, TORQUE_PERCENT, differences
@@ -61,6 +61,22 @@ def test_core_and_motor_in_one(filter_s):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("half", [93, 200])
+@pytest.mark.parametrize("filter_s", [0.0, closed_loop.FILTER_S])
+def test_core_and_motor_from_the_first_sample_on(half, filter_s):
+    """The shaft is driven from the reset on, samples fall into the motor's start, at 93 one beside its last tick."""
+    skip_without_ghdl5()
+    of = in_ghdl.of_half(half)
+    of = of._replace(motor=of.motor._replace(psi_start=of.motor.psi_m // 2))
+    of = of._replace(k_filter=filter_register(of.scale, filter_s))
+    golden = closed_loop.golden_run(of, 40, 1 << 40)
+    rtl = closed_loop.rtl_run(of, golden, len(golden.words))
+    wrong = np.flatnonzero(golden.words != rtl.words)
+    assert not len(wrong), f"gates differ at clock {wrong[0]}"
+    assert rtl.observed[-1] == golden.observed[-1]
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("all_clocks", "exact"), [(sleeping.EVERY_CLOCK, True), (("charge", "gates", "host"), False)])
 def test_nothing_changes_in_what_sleeps(monkeypatch, all_clocks, exact):
     """Every register of the core that sleeps between samples, at every clock from the reset; a watchdog must not."""
@@ -69,6 +85,17 @@ def test_nothing_changes_in_what_sleeps(monkeypatch, all_clocks, exact):
     core = closed_loop.rtl_of(closed_loop.parts(), sleeping.with_witness)
     core.tick(60_000)
     assert (core.missed == 0) == exact and core.get("running")
+
+
+def test_a_driven_shaft_stands_until_the_start_is_over():
+    """No step turns it before, also none of those that the pipeline holds at a reset."""
+    regs = motor_registers(motor_scale(SERVO, U_DC_V, CURRENT_A, CLOCK_HZ), SERVO, SWITCHES)
+    regs, state, angles = regs._replace(hold=1, omega_set=1 << 16), motor_model.State(), []
+    for _ in range(motor_model.STARTING + 8):
+        inputs, tables = motor_model.Inputs(), motor_model.no_tables()
+        state, shown = motor_model.step(state, inputs, regs, tables, motor_model.STEP)
+        angles.append(shown.theta_m)
+    assert not any(angles[: motor_model.STARTING]) and angles[-1] > 0
 
 
 @pytest.mark.slow

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What software writes into the motor of fluxproof_hil: the motor and the sensors of a drive file, as register words.
 
-words = load_words(drive, machine, inverter, sensors, bus)     [(register, word), ...] in the order of writing
+[(register, word), ...] = load_words(drive, machine, inverter, sensors, ...)     in the order of writing
 
 The rotor is held at the angle zero while they are written.  Of the tables only words that are not zero are written:
 block RAM is zero after configuration; ``erase_words()`` are those of a motor that had others before.
@@ -9,18 +9,28 @@ block RAM is zero after configuration; ``erase_words()`` are those of a motor th
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterator
 
 import numpy as np
 
-from fluxproof.hil.registers import bus_registers, code, heat_registers, motor_registers, motor_scale, motor_tables
+from fluxproof.hil.registers import (
+    Thermal,
+    bus_registers,
+    code,
+    filter_register,
+    heat_registers,
+    motor_registers,
+    motor_scale,
+    motor_tables,
+)
 from fluxproof.plant import Bus, Inverter, Machine, Sensors
 from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError
 from golden_model.formats import MOTOR_ANGLE
 from golden_model.io import motor_map
-from golden_model.motor import motor_sensors
+from golden_model.motor import motor_heat, motor_sensors
 from golden_model.motor.motor_model import Tables
 
 HALF = 1 << motor_map.HALF_WORD.width
@@ -30,20 +40,46 @@ Word = tuple[str, int]
 IDEAL = Bus()
 
 
-def load_words(drive: Drive, machine: Machine, inverter: Inverter, sensors: Sensors, bus: Bus = IDEAL) -> list[Word]:
-    """Everything, the start first and its end last; DriveError where the motor cannot be what is asked for."""
+def load_words(
+    drive: Drive,
+    machine: Machine,
+    inverter: Inverter,
+    sensors: Sensors,
+    bus: Bus = IDEAL,
+    thermal: Thermal | None = None,
+    current_filter_s: float = 0.0,
+) -> list[Word]:
+    """Everything, the start first and its end last; DriveError where the motor cannot be what is asked for.
+
+    Without thermal bodies R and magnets are for good those of the machine's temperatures.
+    """
     refuse(drive, machine, sensors)
     try:
         scale = motor_scale(machine, drive.inverter.dc_bus_v, drive.sensors.current_range_a, drive.core.clock_hz)
-        values = motor_registers(scale, machine, inverter)._asdict() | {"u_dc": scale.u_dc(drive.inverter.dc_bus_v)}
-        values |= bus_registers(scale, bus)._asdict() | heat_registers(scale, machine)._asdict()
+        hot = motor_registers(scale, at_its_temperatures(machine), inverter)
+        values = hot if thermal is None else motor_registers(scale, machine, inverter)._replace(psi_start=hot.psi_start)
+        values = values._asdict() | {"u_dc": scale.u_dc(drive.inverter.dc_bus_v)}
+        values |= bus_registers(scale, bus)._asdict() | heat_registers(scale, machine, thermal)._asdict()
+        if thermal is None:  # what motor_temp_winding shows
+            values["ambient"] = code("ambient", machine.temperature_winding_c, motor_heat.CELSIUS)
         values |= sensor_registers(drive, sensors, scale.current_a, scale.voltage_v)
-        tables = motor_tables(scale, machine)
+        values["k_filtex"] = filter_register(scale, current_filter_s)
+        tables = motor_tables(scale, at_its_temperatures(machine) if thermal is None else machine)
     except ValueError as error:
         raise DriveError(str(error)) from None
     rows = [(name, value) for name, value in values.items() if name in motor_map.COMMANDS]
     words = [("start", 1), ("load", 0), *rows, *table_words(tables), ("clear_faults", 1), ("start", 0)]
     return [(motor_map.PREFIX + name, value) for name, value in words]
+
+
+def at_its_temperatures(machine: Machine) -> Machine:
+    """The same machine, described at the temperatures of its winding and of its magnets."""
+    m, ref = machine, machine.temperature_ref_c
+    return dataclasses.replace(
+        machine,
+        resistance_ohm=m.resistance_ohm * (1.0 + m.resistance_temp_coeff_per_k * (m.temperature_winding_c - ref)),
+        magnet_flux_wb=m.magnet_flux_wb * (1.0 + m.magnet_temp_coeff_per_k * (m.temperature_magnet_c - ref)),
+    )
 
 
 def refuse(drive: Drive, machine: Machine, sensors: Sensors) -> None:
@@ -62,6 +98,10 @@ def refuse(drive: Drive, machine: Machine, sensors: Sensors) -> None:
     for key, value in absent.items():
         if value:
             raise DriveError(f"{key} = {value:g}: the motor in the FPGA has none, allowed is 0")
+    if machine.flux_map is not None:
+        raise DriveError(
+            "[plant.machine] flux_map: the motor in the FPGA saturates by saturation_d_per_a2 and the like"
+        )
     if sensors.position_direction < 0:
         raise DriveError("[sensors] position_reverse: the motor in the FPGA counts forward, allowed is false")
 
@@ -85,7 +125,6 @@ def sensor_registers(drive: Drive, sensors: Sensors, current_a: float, voltage_v
         "angle_offset": round(turns / MOTOR_ANGLE.lsb) % (1 << MOTOR_ANGLE.width),
         "counts": counts or 0,
         "hall_offset": 0,
-        "k_filter": 0,  # no key of a drive file describes it
     }
 
 

@@ -2,7 +2,7 @@
 """The numbers of a simulation: what the runs show, and what follows from the drive's data alone.
 
 Every figure is {"value", "unit", "from"}: ``from`` says whether it was measured in the run or calculated.  None where
-a figure has no meaning.
+a figure has no meaning: after a trip the gates are off, and a stage that was not run to its end has no figures.
 """
 
 from __future__ import annotations
@@ -28,6 +28,16 @@ def figure(value, unit: str, source: str = "simulated") -> dict:
     return {"value": None if value is None else float(f"{float(value):.6g}"), "unit": unit, "from": source}
 
 
+def of_stage(run: Run, stage: Stage, value, unit: str) -> dict:
+    """One figure that a stage of the run shows; None where the gates did not stay on to its end."""
+    return figure(None if off_before(run, stage.end) else value, unit)
+
+
+def off_before(run: Run, end: int) -> bool:
+    """Whether a trip has turned the gates off before a sample."""
+    return run.tripped_at is not None and run.tripped_at < end
+
+
 def tail(stage: Stage) -> slice:
     """The samples at the end of a stage."""
     return slice(stage.end - max(int(TAIL * (stage.end - stage.first)), 1), stage.end)
@@ -44,18 +54,18 @@ def of_speed(run: Run) -> dict:
     step, load = run.scene.stage("speed step"), run.scene.stage("load step")
     before = run.scene.stages[run.scene.stages.index(step) - 1].reference
     reached, over = rise_and_overshoot(speed[step.first : step.end], before, step.reference)
-    found["speed_overshoot"] = figure(100.0 * over, "%")
+    found["speed_overshoot"] = of_stage(run, step, 100.0 * over, "%")
     period = run.t[1] - run.t[0]
-    found["speed_rise_to_90_percent"] = figure(None if reached is None else reached * period * 1e3, "ms")
+    found["speed_rise_to_90_percent"] = of_stage(run, step, None if reached is None else reached * period * 1e3, "ms")
     under = speed[load.first : load.end]
     found["load_torque"] = figure(load.load, "Nm", "calculated")
-    found["load_dip"] = figure(load.reference - under.min(), "rpm")
+    found["load_dip"] = of_stage(run, load, load.reference - under.min(), "rpm")
     outside = np.flatnonzero(np.abs(under - load.reference) > BAND * abs(load.reference))
-    found["load_recovery"] = figure((outside[-1] + 1) * period * 1e3 if len(outside) else 0.0, "ms")
+    found["load_recovery"] = of_stage(run, load, (outside[-1] + 1) * period * 1e3 if len(outside) else 0.0, "ms")
     for stage in run.scene.stages:
         error = speed[tail(stage)] - stage.reference
-        found[f"speed_error_{_key(stage)}"] = figure(np.mean(error), "rpm")
-        found[f"speed_noise_{_key(stage)}"] = figure(np.std(error), "rpm rms")
+        found[f"speed_error_{_key(stage)}"] = of_stage(run, stage, np.mean(error), "rpm")
+        found[f"speed_noise_{_key(stage)}"] = of_stage(run, stage, np.std(error), "rpm rms")
     return found
 
 
@@ -64,7 +74,7 @@ def of_currents(run: Run) -> dict:
     error = run["i_q"] - run["i_q_ref"]
     found = {"peak_current": figure(np.hypot(run["true_i_d"], run["true_i_q"]).max(), "A")}
     for stage in run.scene.stages:
-        found[f"i_q_tracking_{_key(stage)}"] = figure(_rms(error[tail(stage)]), "A rms")
+        found[f"i_q_tracking_{_key(stage)}"] = of_stage(run, stage, _rms(error[tail(stage)]), "A rms")
     return found
 
 
@@ -77,9 +87,11 @@ def of_current_step(run: Run, where: str = "") -> dict:
     period = run.t[1] - run.t[0]
     return {
         f"current_step{where}": figure(size, "A", "calculated"),
-        f"current_overshoot{where}": figure(100.0 * over, "%"),
-        f"current_rise_to_90_percent{where}": figure(None if reached is None else reached * period * 1e6, "µs"),
-        f"current_settled_noise{where}": figure(np.std(i_q[-100:]), "A rms"),
+        f"current_overshoot{where}": of_stage(run, stage, 100.0 * over, "%"),
+        f"current_rise_to_90_percent{where}": of_stage(
+            run, stage, None if reached is None else reached * period * 1e6, "µs"
+        ),
+        f"current_settled_noise{where}": of_stage(run, stage, np.std(i_q[-100:]), "A rms"),
     }
 
 
@@ -89,9 +101,10 @@ def of_voltage(drive: Drive, run: Run) -> dict:
     limited = (run["sat_d"] != 0) | (run["sat_q"] != 0)
     m, limit = drive.machine, scenes.voltage_limit(drive)
     rated, current = m.rated_speed_rad_s, min(m.rated_current_a, drive.current_limit_a)
-    found = {"voltage_limited_samples": figure(100.0 * limited.mean(), "%")}
+    whole = run.scene.stages[-1]
+    found = {"voltage_limited_samples": of_stage(run, whole, 100.0 * limited.mean(), "%")}
     for stage in run.scene.stages:
-        found[f"voltage_used_{_key(stage)}"] = figure(100.0 * used[tail(stage)].mean(), "%")
+        found[f"voltage_used_{_key(stage)}"] = of_stage(run, stage, 100.0 * used[tail(stage)].mean(), "%")
     need = scenes.voltage(drive, rated, current)
     found["voltage_margin_at_rated_point"] = figure(100.0 * (1.0 - need / limit), "%", "calculated")
     found["speed_at_full_voltage_rated_current"] = figure(scenes.reach(drive, current) / RPM, "rpm", "calculated")
@@ -137,7 +150,7 @@ def of_heat(drive: Drive, run: Run) -> dict:
         "winding_temperature": figure(m.temperature_winding_c, "degC", "calculated"),
         "magnet_temperature": figure(m.temperature_magnet_c, "degC", "calculated"),
         "resistance_in_the_run": figure(resistance, "ohm", "calculated"),
-        "copper_loss_in_the_run": figure(1.5 * resistance * squares.mean(), "W"),
+        "copper_loss_in_the_run": of_stage(run, run.scene.stages[-1], 1.5 * resistance * squares.mean(), "W"),
         "copper_loss_at_rated_current": figure(copper, "W", "calculated"),
     }
     if m.resistance_temp_coeff_per_k:
@@ -146,11 +159,11 @@ def of_heat(drive: Drive, run: Run) -> dict:
     return found
 
 
-def of_ripple(found: dict) -> dict:
-    """The ripple of the loaded drive."""
+def of_ripple(found: dict, run: Run, stage: Stage) -> dict:
+    """The ripple of the loaded drive at the end of a stage."""
     return {
-        "ripple_peak_to_peak": figure(found["peak_to_peak_a"], "A"),
-        "ripple_rms": figure(found["rms_a"], "A rms"),
+        "ripple_peak_to_peak": of_stage(run, stage, found["peak_to_peak_a"], "A"),
+        "ripple_rms": of_stage(run, stage, found["rms_a"], "A rms"),
     }
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from fluxproof.cosim.driven_plant import Scenario
-from fluxproof.simulate.figures import figure, tail
+from fluxproof.simulate.figures import of_stage, tail
 from fluxproof.simulate.run import Run
 from fluxproof.simulate.scene import LONGEST_S, Scene, Stage
 from golden_model.drive import Drive
@@ -57,10 +57,12 @@ def of_move(drive: Drive, run: Run) -> dict:
     period = run.t[1] - run.t[0]
     outside = np.flatnonzero(np.abs(position - position[-1]) > 2.0 * count)
     return {
-        "way_of_the_move": figure((position[-1] - position[0]) * 360.0, "degrees"),
-        "time_of_the_move": figure((outside[-1] + 1) * period * 1e3 if len(outside) else 0.0, "ms"),
-        "largest_speed": figure(np.abs(run["true_omega_m"][part]).max() * 60.0 / TURN_RAD, "rpm"),
-        "following_error_largest": figure(np.abs(error).max(), "counts"),
-        "following_error_rms": figure(np.sqrt(np.mean(error**2)), "counts"),
-        "position_error_at_the_end": figure(np.mean(run["position_error"][tail(stage)]) / count, "counts"),
+        "way_of_the_move": of_stage(run, stage, (position[-1] - position[0]) * 360.0, "degrees"),
+        "time_of_the_move": of_stage(run, stage, (outside[-1] + 1) * period * 1e3 if len(outside) else 0.0, "ms"),
+        "largest_speed": of_stage(run, stage, np.abs(run["true_omega_m"][part]).max() * 60.0 / TURN_RAD, "rpm"),
+        "following_error_largest": of_stage(run, stage, np.abs(error).max(), "counts"),
+        "following_error_rms": of_stage(run, stage, np.sqrt(np.mean(error**2)), "counts"),
+        "position_error_at_the_end": of_stage(
+            run, stage, np.mean(run["position_error"][tail(stage)]) / count, "counts"
+        ),
     }

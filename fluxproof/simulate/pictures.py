@@ -11,7 +11,7 @@ import numpy as np
 from fluxproof.cosim.scenarios import RPM
 from fluxproof.diagnosis.report import theme
 from fluxproof.simulate import scene as scenes
-from fluxproof.simulate.figures import rpm
+from fluxproof.simulate.figures import off_before, rpm
 from fluxproof.simulate.margins import Loop
 from fluxproof.simulate.run import Run
 from fluxproof.simulate.speed_range import SpeedRange
@@ -39,7 +39,8 @@ def draw(
         drawn["currents"] = currents(drive, run)
         drawn["voltage"] = voltage(drive, run)
         drawn["current_step"] = current_step(drive, step)
-        drawn["ripple"] = ripple(rippled)
+        if not off_before(run, run.scene.stages[2].end):
+            drawn["ripple"] = ripple(rippled)
         drawn["loops"] = bode(loops)
         drawn["speed_range"] = speed_range(drive, reached)
         drawn["circles"] = circles(drive, reached)

@@ -95,7 +95,7 @@ def _figures(drive: Drive, runs: tuple[Run, Run, Run], rippled: dict, back: Rege
     main, step, fast = runs
     groups = {} if main.scene.imposed else {"Speed": figures.of_speed(main)}
     steps = figures.of_current_step(step) | figures.of_current_step(fast, "_at_top_speed")
-    groups["Currents"] = steps | figures.of_currents(main) | figures.of_ripple(rippled)
+    groups["Currents"] = steps | figures.of_currents(main) | figures.of_ripple(rippled, main, main.scene.stages[2])
     groups["Voltage and power"] = figures.of_voltage(drive, main)
     groups["Supply"] = figures.of_supply(drive, main, back)
     groups["Heat"] = figures.of_heat(drive, main)

@@ -4,6 +4,7 @@
 The bus voltage that stands at a tick holds for the step that begins, also for the sensors; while the motor starts it
 is that of the source.  The charge of the step that ends, by the currents that stood at its tick, and the brake
 resistor at this tick change the voltage of the next one.
+A sample before the start is over has neither currents nor an angle.
 The sensors' filter takes the currents that stand at a tick; its outputs are there FILTERED_AT clocks later.
 The temperatures take the same currents; hot resistances act from the next step on, the hot magnet flux in this one.
 """
@@ -29,6 +30,7 @@ class State(NamedTuple):
     filtered: tuple = (0,) * 3  # phases a, b, c
     filtered_1: tuple = (0,) * 3  # of the step before
     heat: motor_heat.State = motor_heat.State()
+    starting_1: int = motor_model.STARTING  # before the last tick
 
 
 @kernel
@@ -62,12 +64,18 @@ def step(state, inputs, brake, regs, of_bus, k_filter, of_heat, tables, clocks):
     of_filter, filtered = state.filter, state.filtered
     if motor.starting == 0:  # before, no currents stand at the outputs
         of_filter, filtered = filter_step(state.filter, shown.i_a, shown.i_b, shown.i_c, k_filter)
-    return State(motor, bus, u_dc, state.u_dc, of_filter, filtered, state.filtered, heat), shown
+    starting = state.motor.starting
+    return State(motor, bus, u_dc, state.u_dc, of_filter, filtered, state.filtered, heat, starting), shown
 
 
 @kernel
-def converted(state, chain, clock, k_filter):
-    """The currents that the converters see at a clock; ``chain``: what stands at the motor's outputs."""
-    if k_filter == 0:
-        return chain.i_a, chain.i_b, chain.i_c
-    return state.filtered if clock % STEP >= FILTERED_AT else state.filtered_1
+def sampled(state, chain, theta, clock, k_filter):
+    """(i_a, i_b, i_c, u_dc, theta_m) held by a trigger; ``chain``, ``theta``: what stands at the motor's outputs."""
+    at_tick = clock % STEP == 0  # whose step acts a clock later
+    u_dc = state.u_dc_1 if at_tick else state.u_dc
+    if (state.starting_1 if at_tick else state.motor.starting) > 0:
+        return 0, 0, 0, u_dc, 0
+    i_a, i_b, i_c = chain.i_a, chain.i_b, chain.i_c
+    if k_filter > 0:
+        i_a, i_b, i_c = state.filtered if clock % STEP >= FILTERED_AT else state.filtered_1
+    return i_a, i_b, i_c, u_dc, theta

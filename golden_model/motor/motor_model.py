@@ -96,8 +96,8 @@ class State(NamedTuple):
     cogging_3: int = 0
     load_1: int = 0
     load_2: int = 0
-    start_1: int = 0
-    start_2: int = 0
+    start_1: int = 1  # no step before the first one turns the shaft
+    start_2: int = 1
     u_dc_1: int = 0
     starting: int = STARTING
     # Voltages in force in the step that ends: three of each leg

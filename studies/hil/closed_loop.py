@@ -83,7 +83,7 @@ class Parts(NamedTuple):
         return {f"motor_{name}": value for name, value in own.items()}
 
 
-def parts(drive: Drive | None = None, machine: Machine = SERVO, bus: Bus = BUS) -> Parts:
+def parts(drive: Drive | None = None, machine: Machine = SERVO, bus: Bus = BUS, body: Thermal = THERMAL) -> Parts:
     """The core and the sensors of a drive, by default servo_24v, with the motor of the study and its bus."""
     drive = drive or load(DRIVES / "servo_24v.toml")
     of_core, sensors = registers(drive), drive.sensors
@@ -94,7 +94,7 @@ def parts(drive: Drive | None = None, machine: Machine = SERVO, bus: Bus = BUS) 
     still = dict.fromkeys(motor_sensors.Registers._fields, 0) | scales | {"noise_i": 20}
     motor, tables = motor_registers(scale, machine, SWITCHES), motor_tables(scale, machine)
     of_bus = bus_registers(scale, bus)
-    k_filter, heat = filter_register(scale, FILTER_S), heat_registers(scale, COPPER, THERMAL)
+    k_filter, heat = filter_register(scale, FILTER_S), heat_registers(scale, COPPER, body)
     return Parts(drive, of_core, scale, motor, tables, motor_sensors.Registers(**still), of_bus, k_filter, heat)
 
 
@@ -141,9 +141,7 @@ class GoldenMotor:
         theta = s.of_shaft.theta >> motor_shaft.DROP_THETA
         if self.ticks - (clock - SHAFT) // STEP == 3:  # the shaft's next step is done already
             theta = self._tick(self.state, load_code)[1].theta_m
-        u_dc = self.state.u_dc_1 if clock % STEP == 0 else self.state.u_dc
-        currents = motor_bench.converted(self.state, chain, clock, self.of.k_filter)
-        seen = motor_sensors.Inputs(*currents, u_dc, theta)
+        seen = motor_sensors.Inputs(*motor_bench.sampled(self.state, chain, theta, clock, self.of.k_filter))
         config = self.of.core.config
         self.random, codes = motor_sensors.step(
             self.random, seen, self.of.sensors, config.adc_bits, config.position_bits

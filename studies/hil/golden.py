@@ -21,7 +21,7 @@ CHAIN, SHAFT = 40, 53  # clocks from a tick to its currents, to its angle
 CONVERSION = 13  # clocks from sample_trigger to sample_valid
 STEP, DROP_THETA = motor_model.STEP, motor_shaft.DROP_THETA
 core_step, bench_step, sensors_step = clocked.step, motor_bench.step, motor_sensors.step
-converted = motor_bench.converted
+sampled = motor_bench.sampled
 MotorRegisters = motor_model.Registers
 CoreInputs, MotorInputs, SensorInputs = clocked.Inputs, motor_model.Inputs, motor_sensors.Inputs
 sample_step, Given, Sample = fluxproof.step_given, fluxproof.Given, fluxproof.Sample
@@ -187,8 +187,7 @@ def run_clocks(hil, asked, moving, host, forced, carry, samples, observed):
             if ticks - (clock - SHAFT) // STEP == 3:  # the shaft's next step is done already
                 _, ahead = bench_step(motor, still, 0, motor_regs, hil.bus, hil.k_filter, hil.heat, hil.tables, STEP)
                 theta = ahead.theta_m
-            u_dc = motor.u_dc_1 if clock % STEP == 0 else motor.u_dc
-            i_a, i_b, i_c = converted(motor, chain, clock, hil.k_filter)
+            i_a, i_b, i_c, u_dc, theta = sampled(motor, chain, theta, clock, hil.k_filter)
             at = SensorInputs(i_a, i_b, i_c, u_dc, theta)
             random, codes = sensors_step(random, at, hil.sensors, config.adc_bits, config.position_bits)
             valid_at = clock + CONVERSION

@@ -24,7 +24,7 @@ from fluxproof.cosim import ghdl
 from fluxproof.cosim.entity import read_entity
 from fluxproof.cosim.flat import flat_top
 from fluxproof.files import write_text
-from fluxproof.hil.registers import PORTS, code
+from fluxproof.hil.registers import PORTS, Thermal, code
 from golden_model import drive as drives
 from golden_model.motor import motor_model
 from studies.hil.closed_loop import BUS, Parts, golden_run, parts, references
@@ -116,7 +116,8 @@ def of_half(half: int) -> Parts:
     drive = drives.with_carrier(drives.load(DRIVES / "servo_24v.toml"), half)
     if half >= FREE:
         return parts(drive)._replace(tables=motor_model.no_tables())
-    of = parts(drive, replace(SERVO, inertia_kgm2=1.0), BUS._replace(capacitance=1e-3, source_ohm=0.0))
+    bus, body = BUS._replace(capacitance=2e-3, source_ohm=0.0), Thermal(3.0, 15.0, 20.0, ambient_c=60.0)
+    of = parts(drive, replace(SERVO, inertia_kgm2=1.0), bus, body)
     speed = code("omega_set", HELD_RAD_S * of.scale.step_s / (2.0 * math.pi), PORTS["omega_set"].fmt)
     return of._replace(tables=motor_model.no_tables(), motor=of.motor._replace(hold=1, omega_set=speed))
 

@@ -14,10 +14,16 @@ import pytest
 
 from cocotb_tests.support.recordings.from_equations import FAST, T, codes, dq_made, made, nominal_of, write
 from cocotb_tests.support.slow import slowly
-from fluxproof.checkout import ROOT
+from fluxproof.checkout import DRIVES, ROOT
 from fluxproof.diagnosis.balance.blocks import view_of
 from fluxproof.diagnosis.checks import STAGES, checks
+from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.loading.load import load_recording
+from fluxproof.diagnosis.replay.telemetry import write_dump
+from golden_model import drive as drives
+from golden_model.fluxproof import Sample
+from golden_model.io import telemetry_words
+from golden_model.registers import registers
 
 
 @pytest.fixture(scope="module")
@@ -335,6 +341,27 @@ def test_a_value_that_is_missing_in_every_second_row_leaves_nothing_to_balance(t
     recording = load_recording(write(tmp_path / "r.csv", table), nominal)
     assert [(p.code, p.column) for p in recording.problems] == [("missing", name), ("too_short", "")]
     assert recording.fatal and not (recording.usable[1:] & recording.usable[:-1]).any()
+
+
+def test_a_missing_value_is_told_with_its_line(tmp_path, nominal):
+    """The header is line 1; a row without a time, which is left out, counts too."""
+    table = made(700)
+    table |= {"t": with_nan(table["t"], 5), "i_b": with_nan(table["i_b"], 20)}
+    recording = load_recording(write(tmp_path / "r.csv", table), nominal)
+    assert "i_b: 1 value missing or not finite, the first in line 22" in [p.message for p in recording.problems]
+
+
+def test_a_dump_of_another_drive_is_told_by_what_differs(tmp_path):
+    """Not by its sample time alone, which would be a log at another rate."""
+    servo, rows = drives.load(DRIVES / "servo_24v.toml"), np.zeros(500, np.int64)
+    samples, seen = dict.fromkeys(Sample._fields, rows), dict.fromkeys(telemetry_words.PACKET, rows)
+    dump = write_dump(tmp_path / "r.fluxdump", servo, registers(servo), samples, seen, counter=np.arange(500))
+    for other, wanted in (("drone_24v", "sample time 50 us, not 25; current at full code 16.5 A, not 20;"),
+                          ("paper001", "sample time 50 us, not 100; ")):  # fmt: skip
+        found = load_recording(dump, load_nominal(DRIVES / f"{other}.toml")).problems
+        assert any(p.fatal and f"another drive than the drive file's: {wanted}" in p.message for p in found), found
+    found = load_recording(dump, load_nominal(DRIVES / "servo_24v.toml")).problems
+    assert not any("another drive" in p.message for p in found)
 
 
 def test_a_missing_value_makes_no_third_sensor(tmp_path, nominal):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fluxproof.diagnosis.ground.quantities import counted
 from fluxproof.diagnosis.ground.recording import Problem
 
 STAGE = "values"
@@ -55,7 +56,7 @@ def check(recording, nominal) -> None:
             recording.problems.append(
                 Problem(
                     "missing",
-                    f"{bad} values missing or not finite",
+                    f"{name}: {counted(bad, 'value')} missing or not finite, {_place(recording, row)}",
                     name,
                     row,
                     bad,
@@ -63,6 +64,12 @@ def check(recording, nominal) -> None:
                 )
             )
         columns[name] = filled
+
+
+def _place(recording, row: int) -> str:
+    """Where a row stands in its file, as far as that has lines."""
+    lines = recording.meta.get("lines")
+    return f"the first in row {row}" if lines is None else f"the first in line {lines[row]}"
 
 
 def _between(name, lost, where, values):
@@ -97,3 +104,5 @@ def keep_rows(recording, rows) -> None:
     recording.usable, recording.joined = recording.usable[rows], joined
     if "run" in recording.meta:
         recording.meta["run"] = recording.meta["run"][rows]
+    if "lines" in recording.meta:
+        recording.meta["lines"] = recording.meta["lines"][rows]

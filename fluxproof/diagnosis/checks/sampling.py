@@ -26,6 +26,12 @@ UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9}
 def check(recording, nominal) -> None:
     if recording.fatal or recording.points or len(recording) < 2:
         return
+    if differ := of_another_drive(recording.meta.get("telemetry"), nominal):
+        message = (
+            f"the telemetry is that of another drive than the drive file's: {differ}; give the drive file of the dump"
+        )
+        recording.problems.append(Problem("sample_time", message, "t", 0, len(recording), fatal=True))
+        return
     period = nominal.sample_time_s
     step = np.diff(recording["t"])
     if _rebuild_coarse(recording, step, period):
@@ -72,6 +78,30 @@ def check(recording, nominal) -> None:
             Problem("one_axis", message, "u_d_ref", -1, 0, "only the q axis of steady operating points is used")
         )
     _join(recording, step, usual)
+
+
+def of_another_drive(header, nominal) -> str:
+    """What the header of a dump contradicts in the drive file; "" if its sample time agrees, or all else does."""
+    if header is None or abs(header["sample_time_s"] / nominal.sample_time_s - 1.0) <= TOLERANCE:
+        return ""
+    s, machine, chosen, bases = nominal.sensors, nominal.machine, nominal.bases, header["bases"]
+    volts = chosen.voltage_v or (s.u_dc_range_v or 0.0) / 2.0
+    pairs = {
+        "current at full code": (bases["current_a"], chosen.current_a or s.current_range_a, "A"),
+        "bus voltage at full code": (2.0 * bases["voltage_v"], 2.0 * volts, "V"),
+        "electrical speed at 1.0": (
+            bases["omega_me_rad_s"], chosen.omega_me_rad_s or machine.pole_pairs * machine.rated_speed_rad_s, "rad/s"
+        ),
+        "adc_bits": (header["config"]["adc_bits"], s.adc_bits, ""),
+        "position_bits": (header["config"]["position_bits"], s.position_bits, ""),
+    }  # fmt: skip
+    differ = [
+        f"{name} {ran:g} {unit}".rstrip() + f", not {stated:g}"
+        for name, (ran, stated, unit) in pairs.items()
+        if stated and abs(ran / stated - 1.0) > TOLERANCE
+    ]
+    time = f"sample time {header['sample_time_s'] * 1e6:g} us, not {nominal.sample_time_s * 1e6:g}"
+    return "; ".join([time, *differ]) if differ else ""
 
 
 def _has_voltage(recording) -> bool:

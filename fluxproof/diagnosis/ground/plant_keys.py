@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The keys of the plant by section, their values from an effect or from [plant.*] of a drive file, and the flux map.
 
-The names are those of plant.Machine, plant.Inverter, plant.Sensors and of Timing below.  Where a section of the core
-has the same key, its range applies; the others have the range of their unit (drive_keys.RANGES).
+The names are those of plant.Machine, plant.Inverter, plant.Sensors and of Timing and Hil below.  Where a section of the
+core has the same key, its range applies; the others have the range of their unit (drive_keys.RANGES).
 """
 
 from __future__ import annotations
@@ -41,7 +41,22 @@ class Timing:
     angle_delay_s: float = 0.0
 
 
-SECTIONS = {"machine": Machine, "inverter": Inverter, "sensors": Sensors, "timing": Timing}
+@dataclass(frozen=True)
+class Hil:
+    """What the motor in the FPGA has and the plant does not; zeros: nothing of it.
+
+    current_filter_s: time constant of a filter in front of the current converters.
+    winding_j_per_k, winding_s, magnet_s: heat capacity of the winding, its time constant to the ambient, that of the
+    magnets to the winding.  They warm from temperature_winding_c of [plant.machine], which is the ambient's.
+    """
+
+    current_filter_s: float = 0.0
+    winding_j_per_k: float = 0.0
+    winding_s: float = 0.0
+    magnet_s: float = 0.0
+
+
+SECTIONS = {"machine": Machine, "inverter": Inverter, "sensors": Sensors, "timing": Timing, "hil": Hil}
 KEYS = {f"{name}.{f.name}": f for name, kind in SECTIONS.items() for f in dataclasses.fields(kind)}
 UNITS = {"a": "A", "v": "V", "s": "s", "rad": "rad", "nm": "Nm"}  # by the end of a key's name
 OWN = {  # ranges that are neither the core's nor those of a unit
@@ -58,6 +73,8 @@ OWN = {  # ranges that are neither the core's nor those of a unit
     "machine.cogging_order": Key("int", lo=0, hi=100_000),
     "machine.shorted_share": Key("float", "1", 0.0, 0.9),
     "machine.shorted_phase": Key("int", lo=0, hi=2),
+    **{f"hil.{name}": Key("float", "s", 0.0, RANGES["s"][1]) for name in ("current_filter_s", "winding_s", "magnet_s")},
+    "hil.winding_j_per_k": Key("float", "J/K", 0.0, RANGES["W"][1]),
 }
 
 

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fluxproof.diagnosis.ground.nominal import Nominal, flux_map_path, load_nominal
-from fluxproof.diagnosis.ground.plant_keys import HARMONICS, Timing, plain, plant_given, read_flux_map
+from fluxproof.diagnosis.ground.plant_keys import HARMONICS, Hil, Timing, plain, plant_given, read_flux_map
 from fluxproof.diagnosis.ground.result import NamedEffect
 from fluxproof.plant import Inverter, Machine, Sensors
 from golden_model.drive_keys import DriveError
@@ -35,6 +35,7 @@ class Plant(NamedTuple):
     inverter: Inverter
     sensors: Sensors
     timing: Timing
+    hil: Hil
 
 
 # Keys that an effect gives in addition to those of the drive file; the others it gives as a whole.
@@ -87,7 +88,7 @@ def in_addition(found: dict, nominal: Nominal) -> dict:
 
 
 def plant_of(source) -> Plant:
-    """(Machine, Inverter, Sensors, Timing) of a drive file's path or of a Nominal; DriveError as in load_nominal."""
+    """(Machine, Inverter, Sensors, Timing, Hil) of a drive file's path or of a Nominal; errors as in load_nominal."""
     nominal = source if isinstance(source, Nominal) else load_nominal(source)
     given, chart = plant_given(nominal), flux_map_path(nominal)
     usual: dict[str, Any] = {"inertia_kgm2": 1e-3}
@@ -99,6 +100,7 @@ def plant_of(source) -> Plant:
             Inverter(**(_described(nominal.inverter, Inverter) | given["inverter"])),
             Sensors(**(described_sensors(nominal) | given["sensors"])),
             Timing(**given["timing"]),
+            Hil(**given["hil"]),
         )
     except (TypeError, ValueError) as error:
         raise DriveError(f"{nominal.path}: section [plant]: {error}") from None

@@ -107,6 +107,8 @@ def _recording(path, table: Table, plan: Plan, nominal) -> Recording:
         notes.append(f"no time column: rows are assumed to be {step:g} s apart")
     if plan.run and plan.run in table.columns:
         meta["run"] = table.columns[plan.run]
+    if table.lines is not None:
+        meta["lines"] = table.lines
     recording = Recording(
         str(path), columns, np.ones(n, bool), np.append(np.ones(n - 1, bool), False), meta=meta, lacks=lacks
     )

@@ -19,7 +19,7 @@ import numpy as np
 
 from fluxproof.diagnosis.ground.limits import limited
 from fluxproof.diagnosis.ground.recording import RecordingError
-from fluxproof.diagnosis.replay.telemetry import write_dump
+from fluxproof.diagnosis.replay.telemetry import MAGIC, write_dump
 from golden_model.fluxproof import Sample
 from golden_model.io import telemetry_words as packet
 from golden_model.io.telemetry_words import COUNT, COUNTER, FIELDS, HEADER_WORD, LAYOUT, PACKET
@@ -164,6 +164,8 @@ def _what_is_wrong(row: np.ndarray, byte: int) -> str:
 
 def _why_nothing(raw: bytes) -> str:
     """The reason why no packet was found."""
+    if raw.startswith(MAGIC):
+        return "this is a dump already, which `fluxproof diagnose` reads"
     if len(raw) < SIZE:
         return f"{len(raw)} bytes are too few for a telemetry packet, which has {SIZE}"
     for found in re.finditer(rb"(?s)(?=(..)" + packet.MAGIC.to_bytes(2, "little") + b")", raw):
