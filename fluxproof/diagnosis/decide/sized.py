@@ -16,6 +16,7 @@ import numpy as np
 
 from fluxproof.diagnosis.decide.estimates import estimates_in
 from fluxproof.diagnosis.effects import DOUBT
+from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.result import Estimate
 
 VANISHES = 1e6  # times the value: a parameter that grows beyond all limits as its effect vanishes, as a resistance
@@ -26,7 +27,7 @@ def with_sizes(posterior):
     """The posterior over the sets of which every effect is larger than its own standard deviation."""
     fits, best = {}, -math.inf
     for fit in sorted(posterior.fits.values(), key=lambda f: -f.value):
-        if fit.value < best - FAINT or all(is_sized(fit, n, 1.0) for n in fit.names):
+        if fit.value < best - FAINT or all(is_sized(fit, n, k.SIZED) for n in fit.names):
             fits[fit.names] = fit
             best = max(best, fit.value)
     return replace(posterior, fits=fits)
