@@ -12,14 +12,15 @@ from cocotb_tests.support.drives import PAPER
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.decide.ambiguity import alternatives, ambiguities
 from fluxproof.diagnosis.decide.bent import bent_groups
-from fluxproof.diagnosis.decide.names import _sized, names_of
+from fluxproof.diagnosis.decide.names import names_of
+from fluxproof.diagnosis.decide.sized import with_sizes
 from fluxproof.diagnosis.ground.nominal import load_nominal
 from fluxproof.diagnosis.inference.posterior import Posterior
 
 
 def kept(*sets) -> list:
-    """[(probability, fit)] of (probability, effects)."""
-    return [(p, SimpleNamespace(names=tuple(names.split()))) for p, names in sets]
+    """[(probability, names)] of (probability, effects)."""
+    return [(p, tuple(names.split())) for p, names in sets]
 
 
 def effects(*without_parameter) -> dict:
@@ -28,8 +29,8 @@ def effects(*without_parameter) -> dict:
 
 def groups(sets, sure=(), beyond=()):
     present: dict = {}
-    for p, fit in sets:
-        for n in fit.names:
+    for p, names in sets:
+        for n in names:
             present[n] = present.get(n, 0.0) + p
     return ambiguities(sets, present, sure, effects(*beyond))
 
@@ -51,28 +52,51 @@ def test_what_is_no_ambiguity(sets, beyond):
     assert groups(sets, beyond=beyond) == ()
 
 
-def test_an_alternative_without_a_size_is_left_out():
-    """A saturated machine was one of 18 causes, of which eight had sizes such as 0.6 +- 1.9 us."""
+KEYS = {"resistance": "delta_r", "magnet_flux": "delta_psi_m", "delay": "tau", "udc_gain": "gain"}
+
+
+def found(*sets):
+    """A posterior of sets (probability, {effect: (value, standard deviation)})."""
     nominal = load_nominal(PAPER)
     view = SimpleNamespace(nominal=nominal, has_voltage=np.ones(1, bool), shaft=np.array(["driving"]))
     setup = SimpleNamespace(effects=CATALOGUE, view=view)
-    keys = {"resistance": "delta_r", "magnet_flux": "delta_psi_m", "delay": "tau"}
-    values = {"resistance": (0.3, 0.01), "magnet_flux": (0.01, 0.001), "delay": (6e-7, 1.9e-6)}
+    fits = {}
+    for p, sizes in sets:
+        names = tuple(sorted(sizes))
+        c, cov = {n: {KEYS[n]: sizes[n][0]} for n in names}, np.diag([sizes[n][1] ** 2 for n in names])
+        problem = SimpleNamespace(setup=setup, view=view, keys=[(n, KEYS[n]) for n in names])
+        places = {n: [place] for place, n in enumerate(names)}
+        fits[names] = SimpleNamespace(problem=problem, names=names, value=np.log(p), c=c, cov=cov, places=places)
+    return Posterior(setup, fits)
 
-    def fit(*names):
-        problem = SimpleNamespace(setup=setup, view=view, keys=[(n, keys[n]) for n in names])
-        cov = np.diag([values[n][1] ** 2 for n in names])
-        c = {n: {keys[n]: values[n][0]} for n in names}
-        places = {n: [k] for k, n in enumerate(names)}
-        return SimpleNamespace(problem=problem, names=names, c=c, cov=cov, places=places)
 
-    weights = [(0.5, fit("resistance")), (0.3, fit("magnet_flux")), (0.2, fit("delay", "magnet_flux"))]
-    present = {"resistance": 0.5, "magnet_flux": 0.5, "delay": 0.2}
-    posterior = SimpleNamespace(
-        weights=lambda: weights, best=lambda: weights[0][1], present=lambda: present, setup=setup
-    )
-    found = names_of(posterior)
-    assert found.ambiguous == (("magnet_flux", "resistance"),) and found.possible == {"delay": 0.2}
+def test_an_alternative_without_a_size_is_left_out():
+    """A saturated machine was one of 18 causes, of which eight had sizes such as 0.6 +- 1.9 us."""
+    sets = ((0.5, {"resistance": (0.3, 0.01)}), (0.3, {"magnet_flux": (0.01, 0.001)}),
+            (0.2, {"delay": (6e-7, 1.9e-6), "magnet_flux": (0.01, 0.001)}))  # fmt: skip
+    names = names_of(with_sizes(found(*sets)))
+    assert names.ambiguous == (("magnet_flux", "resistance"),) and not names.possible
+    assert ("delay", "magnet_flux", "resistance") in names_of(found(*sets)).ambiguous
+
+
+@pytest.mark.parametrize("beside", [0.0002, 0.0013])
+def test_a_name_whose_size_is_open_because_of_a_rival_is_an_ambiguity_with_it(beside):
+    """A magnet flux of +13 %, and of +1 % beside a bus gain, was rejected from all sets: a resistance explained all."""
+    always = {"resistance": (0.3, 0.01)}
+    sets = ((0.6, always | {"magnet_flux": (0.01, 0.001)}),
+            (0.35, always | {"magnet_flux": (beside, 0.001), "udc_gain": (0.12, 0.04)}),
+            (0.05, always | {"udc_gain": (0.13, 0.01)}))  # fmt: skip
+    names = names_of(with_sizes(found(*sets)))
+    assert list(names.named) == ["resistance"] and names.ambiguous == (("magnet_flux", "udc_gain"),)
+    assert not names.sizeless and not names.possible
+
+
+def test_a_name_without_a_size_in_any_set_is_none():
+    """A coefficient of 1.5 standard deviations may be certain, and says nothing of the drive."""
+    posterior = with_sizes(found((1.0, {"resistance": (0.3, 0.01), "magnet_flux": (0.0015, 0.001)})))
+    names = names_of(posterior)
+    assert list(names.named) == ["resistance"] and list(names.sizeless) == ["magnet_flux"] and not names.ambiguous
+    assert names.only_possible(posterior.best()) == {"magnet_flux"}
 
 
 @pytest.mark.parametrize("agrees, first", [(True, ""), (False, "a")])
@@ -105,9 +129,3 @@ def test_groups_are_connected():
     """Of a or b, and b or c, any may stand for another; d, in all sets, is no alternative."""
     assert alternatives([frozenset(x) for x in ("ad", "bd", "cd")]) == [{"a", "b", "c"}]
     assert alternatives([frozenset(x) for x in ("d", "ad", "abd")]) == []
-
-
-def test_members_without_a_size_leave_an_alternative_and_not_its_statement():
-    """One of two inductances was there with certainty, and nothing was said, as the other had no size."""
-    assert _sized(("a", "b", "c"), {"a", "c"}) == ("a", "c")
-    assert _sized(("a", "b"), {"a"}) == ("a", "b") == _sized(("a", "b"), set())

@@ -10,11 +10,11 @@ from fluxproof.diagnosis.ground import constants as k
 
 
 def ambiguities(kept, present, sure, effects) -> tuple[tuple[str, ...], ...]:
-    """Groups of which one effect is there; kept: [(probability, fit)] of the sets that hold the posterior's mass.
+    """Groups of which one effect is there; kept: [(probability, effects)] of the sets that hold the posterior's mass.
 
     present: {effect: probability}; sure: effects that are named, so that they are no alternative.
     """
-    rest = [frozenset(fit.names) - set(sure) for _, fit in kept]
+    rest = [frozenset(names) - set(sure) for _, names in kept]
     groups = [tuple(sorted(n for n in g if present[n] >= k.OPEN)) for g in alternatives(rest)]
     rules = (
         _has_rivals,
@@ -54,7 +54,7 @@ def _has_rivals(group) -> bool:
 def _is_needed(group, kept) -> bool:
     """Of an alternative one effect is there; where none may be, its members are only possible."""
     held = sum(p for p, _ in kept)
-    return sum(p for p, fit in kept if set(group) & set(fit.names)) >= (1.0 - k.DOUBTED) * held
+    return sum(p for p, names in kept if set(group) & set(names)) >= (1.0 - k.DOUBTED) * held
 
 
 def _has_a_parameter(group, effects) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fluxproof.diagnosis.decide.decision import IMITATION, INSIGNIFICANT, NOISE, Basis, Decision, Withheld
+from fluxproof.diagnosis.decide.decision import IMITATION, INSIGNIFICANT, NOISE, SIZELESS, Basis, Decision, Withheld
 from fluxproof.diagnosis.decide.estimates import estimates_in, named_effects
 from fluxproof.diagnosis.decide.likeliest import likeliest
 from fluxproof.diagnosis.decide.locate import evidence, locate
@@ -41,7 +41,7 @@ def conclude(posterior, held) -> Decision:
         explained_share=j.share if explained == j.explaining else 0.0,
         remainder=_remainder(j),
         unknown_term=unknown,
-        best_fit=likeliest(j.searched, j.posterior.idle, held) if j.kind == "unexplained" else None,
+        best_fit=likeliest(j.searched, j.sizeless, held) if j.kind == "unexplained" else None,
         minor=tuple(named_effects(j.names, j.posterior, shares, only=set(j.names.minor))),
         alike=_alike(j, held, unknown),
         evidence=evidence(view, (cells, cells.y), (cells, left), setup.noise, held),
@@ -71,7 +71,7 @@ def _withheld(j: Judgement, shares) -> tuple[Withheld, ...]:
     unsure = NOISE if j.kind == "no_mismatch" else INSIGNIFICANT
     return (
         *(Withheld(n, IMITATION, shares[n]) for n in dropped),
-        *(Withheld(n, why) for n, why in sorted(j.posterior.idle.items())),
+        *(Withheld(n, SIZELESS) for n in sorted(j.sizeless)),
         *(Withheld(n, unsure, p) for n, p in possible),
     )
 

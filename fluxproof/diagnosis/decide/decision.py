@@ -26,7 +26,6 @@ from fluxproof.diagnosis.inference.posterior import Posterior
 # Why an effect is withheld.
 IMITATION = "imitation"  # a large residual may imitate it
 CONSTANT = "constant"  # at one operating point: an unexplained constant misfit may imitate its drift
-HELD_OUT = "held_out"  # it worsens the prediction at operating points that were not fitted
 NOISE = "noise"  # recording and simulation agree without it
 SIZELESS = "sizeless"  # its size is compatible with zero
 INSIGNIFICANT = "insignificant"  # its probability is below that of a name

@@ -24,7 +24,7 @@ def without_possible(names, best: FittedSet) -> tuple[FittedSet, float]:
     if not possible:
         return best, 0.0
     fewer = fit_set(best.problem, [n for n in best.names if n not in possible])
-    return fewer, 1.0 - min(names.possible.get(n, 0.0) for n in possible)
+    return fewer, 1.0 - min((names.possible | names.sizeless).get(n, 0.0) for n in possible)
 
 
 def named_effects(names, posterior, explains, only=None) -> list[NamedEffect]:
@@ -73,7 +73,7 @@ def _with_absence(estimates, effect, ends, absent, nominal) -> dict[str, Estimat
     first, last = (effect.estimates(c, exact, nominal) for c in ends)
     out = {}
     for key, e in estimates.items():
-        moved = last[key].value - first[key].value if key in last else 0.0
+        moved = last[key].value - first[key].value if key in first and key in last else 0.0
         out[key] = replace(e, sigma=float(np.hypot(e.sigma, np.sqrt(absent * (1.0 - absent)) * moved)))
     return out
 

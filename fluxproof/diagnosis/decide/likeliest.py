@@ -3,22 +3,16 @@
 
 from __future__ import annotations
 
-from fluxproof.diagnosis.decide.decision import HELD_OUT, SIZELESS
 from fluxproof.diagnosis.decide.estimates import estimates_in
 from fluxproof.diagnosis.decide.sizes import Sizes, measured_torque
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.result import BestFit, NamedEffect
 
-AGAINST = {
-    HELD_OUT: "held-out points are worse with it",
-    SIZELESS: "its size is compatible with zero",
-}
 
-
-def likeliest(searched, idle, held) -> BestFit | None:
+def likeliest(searched, sizeless, held) -> BestFit | None:
     """The best fit among the sets that a simulation has parameters for; None if no effect is more probable than none.
 
-    searched: the posterior before effects were rejected; idle: {effect: why it was}; held: (b,) held-out blocks.
+    searched: the posterior over all sets; sizeless: effects without a size; held: (b,) held-out blocks.
     """
     setup, weights = searched.setup, searched.weights()
     able = [(p, fit) for p, fit in weights if all(setup.effects[n].named for n in fit.names)]
@@ -28,7 +22,7 @@ def likeliest(searched, idle, held) -> BestFit | None:
     before, left = (_left(setup, y, held) for y in (setup.cells.y, fit.left()))
     present = searched.present()
     effects = tuple(NamedEffect(n, min(present[n], 0.999), estimates_in(fit, n), 0.0) for n in fit.names)
-    return BestFit(effects, float(p), left, _against(p, fit, idle, left / max(before, 1e-300)))
+    return BestFit(effects, float(p), left, _against(p, fit, sizeless, left / max(before, 1e-300)))
 
 
 def _left(setup, y, held) -> float:
@@ -38,11 +32,12 @@ def _left(setup, y, held) -> float:
     return found.after if found else 0.0
 
 
-def _against(p, fit, idle, share) -> str:
+def _against(p, fit, sizeless, share) -> str:
     """Why the best fit is not asserted; share: of the misfit's rms that it leaves."""
-    rejected = [idle[n] for n in fit.names if n in idle]
-    if rejected or share >= 1.0:
-        return AGAINST[rejected[0] if rejected else HELD_OUT]
+    if sizeless.intersection(fit.names):
+        return "its size is compatible with zero"
+    if share >= 1.0:
+        return "held-out points are worse with it"
     if 1.0 - share**2 < k.HALF:
         return f"it leaves {100 * share:.0f} % of the misfit"
     return "other sets of effects fit as well" if p < 1.0 - k.DOUBTED else "the residual may imitate it"

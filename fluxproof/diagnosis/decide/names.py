@@ -9,7 +9,7 @@ is in the marginal likelihood of every set.  Only where much is left is it asked
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,8 +17,8 @@ from fluxproof.diagnosis.balance.shaft import measures_torque
 from fluxproof.diagnosis.decide.ambiguity import ambiguities
 from fluxproof.diagnosis.decide.bent import bent_groups
 from fluxproof.diagnosis.decide.credibility import credibilities
-from fluxproof.diagnosis.decide.estimates import estimates_in
-from fluxproof.diagnosis.decide.sized import has_size
+from fluxproof.diagnosis.decide.estimates import estimates_in, named_effects
+from fluxproof.diagnosis.decide.sized import has_size, is_sized
 from fluxproof.diagnosis.effects.constant import Constant
 from fluxproof.diagnosis.effects.drive_file import Restates
 from fluxproof.diagnosis.ground import constants as k
@@ -32,8 +32,9 @@ class Names:
 
     possible: {effect: probability} of effects that are neither named nor an alternative.  suspects: {effect:
     probability} of causes that are as sure as a name but that no simulation carries.  minor: {effect: probability} of
-    what is as sure as a name and too small to act on (relevant.py).  fits: [(probability, fit)] of the
-    sets that hold the mass of the posterior, the most probable first.
+    what is as sure as a name and too small to act on (relevant.py).  sizeless: {effect: probability} of what is as sure
+    as a name and has no size (sized.py).  fits: [(probability, fit)] of the sets that hold the mass of the posterior,
+    the most probable first.
     """
 
     named: dict[str, float]
@@ -42,6 +43,7 @@ class Names:
     suspects: dict[str, float] = field(default_factory=dict)
     fits: tuple = ()
     minor: dict[str, float] = field(default_factory=dict)
+    sizeless: dict[str, float] = field(default_factory=dict)
 
     @property
     def asserted(self) -> set[str]:
@@ -57,20 +59,32 @@ class Names:
         kept = {n: p for n, p in self.named.items() if n in but}
         possible = {n: p for n, p in self.named.items() if n not in but}
         groups = tuple(g for g in self.ambiguous if but.issuperset(g))
-        return Names(kept, groups, self.possible | possible, {}, self.fits, self.minor)
+        return replace(self, named=kept, ambiguous=groups, possible=self.possible | possible, suspects={})
 
 
 def names_of(posterior) -> Names:
-    """Names and ambiguities of a posterior."""
+    """Names and ambiguities of a posterior.
+
+    A name without a size over all probable sets is open: its size is that of a rival in some of them, where it is not.
+    """
     kept = _mass(posterior)
+    names = _names_of(posterior, kept, ())
+    open_ = _sizeless(names, posterior)
+    return _names_of(posterior, kept, open_) if open_ else names
+
+
+def _names_of(posterior, kept, open_) -> Names:
+    """Names and ambiguities, where the effects ``open_`` are in a set only if they have a size there."""
     best, effects = posterior.best(), posterior.setup.effects
     seen = {n for _, fit in kept for n in fit.names}
     present = {n: p for n, p in posterior.present().items() if n in seen}
     sure = {n: p for n, p in present.items() if p >= 1.0 - k.DOUBTED and n in best.names}
+    sizeless = {n: sure.pop(n) for n in open_}
+    there = [(p, frozenset(n for n in fit.names if n not in open_ or is_sized(fit, n))) for p, fit in kept]
+    present |= {n: sum(p for p, names in there if n in names) for n in open_}
     named = {n: p for n, p in sure.items() if effects[n].named}
     suspects = _no_imitations({n: p for n, p in sure.items() if not effects[n].named}, best)
-    sized = {n for n in present if _has_a_size(n, effects[n], kept)}
-    groups = tuple(_with_what_depends(_sized(g, sized), named, kept) for g in ambiguities(kept, present, sure, effects))
+    groups = tuple(_with_what_depends(g, named, kept) for g in ambiguities(there, present, sure, effects))
     twins = [n for n in named if _has_a_twin(n, effects, groups)]
     if twins and not measures_torque(posterior.setup.view):  # which a wrong current changes, and a wrong nameplate not
         groups += tuple(_with_its_twin(n, effects[n], best.c[n]) for n in twins)
@@ -80,24 +94,18 @@ def names_of(posterior) -> Names:
         groups = _with_the_same_torque(groups, same)
     named = {n: p for n, p in named.items() if not any(n in g for g in groups)}
     grouped = {n for g in groups for n in g}
-    possible = {n: p for n, p in present.items() if n not in sure and n not in grouped and p >= k.PRESENT}
-    return Names(named, groups, possible, suspects, tuple(kept))
+    sizeless = {n: p for n, p in sizeless.items() if n not in grouped}
+    rest = present.keys() - sure.keys() - sizeless.keys() - grouped
+    possible = {n: p for n, p in present.items() if n in rest and p >= k.PRESENT}
+    return Names(named, groups, possible, suspects, tuple(kept), sizeless=sizeless)
 
 
-def _has_a_size(name, effect, kept) -> bool:
-    """Whether an effect has a size in any probable set: one that has none explains nothing, and is no alternative.
-
-    Of 18 alternatives for a saturated machine, eight stood beside a cause without explaining a part.
-    """
-    fits = [fit for _, fit in kept if name in fit.names]
-    nominal = fits[0].problem.view.nominal
-    return any(has_size(estimates_in(fit, name), effect, fit.c[name], nominal) for fit in fits)
-
-
-def _sized(group, sized) -> tuple[str, ...]:
-    """The members of an alternative that have a size; all where fewer than two have: that one is there is known."""
-    mine = tuple(n for n in group if n in sized)
-    return mine if len(mine) > 1 else group
+def _sizeless(names, posterior) -> set[str]:
+    """Names of which every parameter is compatible with zero, its standard deviation that of the answer."""
+    best, effects = posterior.best(), posterior.setup.effects
+    nominal = best.problem.view.nominal
+    found = named_effects(names, posterior, {})
+    return {e.name for e in found if not has_size(e.parameters, effects[e.name], best.c[e.name], nominal)}
 
 
 def _no_imitations(suspects, fit) -> dict[str, float]:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The rules by which a posterior becomes a verdict with names, in the order in which they apply.
 
-    1. held_out.py      what worsens the prediction at points that were not fitted is rejected
-    2. names.py         what is probable is named, rivals are ambiguous (ambiguity.py); where the misfit is more than a
-                        recording of this kind has, there is a cause, so that "none" is no alternative
+    1. sized.py         a set in which an effect is smaller than its own uncertainty is no explanation
+    2. names.py         what is probable and has a size is named, rivals are ambiguous (ambiguity.py); where the misfit
+                        is more than a recording of this kind has, there is a cause, so that "none" is no alternative
     3. off_orders.py    a misfit outside the orders of the balance is looked for
     4. _as_noise        nothing is asserted where recording and simulation agree
     5. relevant.py      what is too small to act on is no cause
@@ -21,10 +21,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fluxproof.diagnosis.decide.decision import Decision
-from fluxproof.diagnosis.decide.held_out import without_idle
 from fluxproof.diagnosis.decide.names import Names, names_of
 from fluxproof.diagnosis.decide.off_orders import Stray, row_residual, stray_order, stray_swing, stray_torque
 from fluxproof.diagnosis.decide.relevant import relevant_names
+from fluxproof.diagnosis.decide.sized import with_sizes
 from fluxproof.diagnosis.decide.sizes import Sizes, left_by, measured_torque
 from fluxproof.diagnosis.decide.verdict import at_floor, is_usual, kind_of, without_imitations
 from fluxproof.diagnosis.effects import ShaftTorque
@@ -36,10 +36,10 @@ from fluxproof.diagnosis.inference.posterior import Posterior
 class Judgement:
     """What the rules decide on a posterior.
 
-    searched: the posterior before effects were rejected;
-    posterior: over the sets that are possible; names: what is asserted; found: the names before rule 7; explaining:
-    effects that explain a part of the misfit; channel, share: where the explained share is counted, and what it is;
-    stray: a misfit outside the orders of the balance; train, unseen: sizes on fitted and on held-out blocks.
+    searched: the posterior over all sets; posterior: over those whose effects have sizes; names: what is asserted;
+    found: the names before rule 7; sizeless: what is not named for its size; explaining: effects that explain a part of
+    the misfit; channel, share: where the explained share is counted, and what it is; stray: a misfit outside the orders
+    of the balance; train, unseen: sizes on fitted and on held-out blocks.
     """
 
     searched: Posterior
@@ -47,6 +47,7 @@ class Judgement:
     kind: str
     names: Names
     found: Names
+    sizeless: frozenset[str]
     explaining: set[str]
     channel: str
     share: float | None
@@ -58,7 +59,7 @@ class Judgement:
 def judge(posterior, held) -> Judgement:
     """The judgement on a posterior; held: (b,) blocks that were not fitted."""
     setup, searched = posterior.setup, posterior
-    posterior = setup.call(without_idle, posterior, held)
+    posterior = setup.call(with_sizes, posterior)
     posterior = replace(posterior, agrees=is_usual(_sizes(posterior.best(), set(), ~held)))
     names, best = setup.call(names_of, posterior), posterior.best()
     stray = setup.call(_off_orders, posterior, frozenset(names.suspects), held)
@@ -69,8 +70,8 @@ def judge(posterior, held) -> Judgement:
     share = unseen.share(channel) if _is_counted(explaining, setup) else None
     kind = kind_of(names, train, unseen, channel, share, stray)
     kind = without_imitations(kind, names, best)
-    asserted = _beside_unknown(names, kind)
-    return Judgement(searched, posterior, kind, asserted, names, explaining, channel, share, stray, train, unseen)
+    found = _beside_unknown(names, kind), names, _sizeless(names, searched)
+    return Judgement(searched, posterior, kind, *found, explaining, channel, share, stray, train, unseen)
 
 
 def not_compared(verdict: str) -> Decision:
@@ -129,6 +130,12 @@ def _as_noise(posterior, names, stray, held) -> Names:
 def _beside_unknown(names, kind) -> Names:
     """Rule 7: beside a large unknown part even a probable name may be its imitation."""
     return replace(names, named={}, ambiguous=()) if kind == "unexplained" else names
+
+
+def _sizeless(names, searched) -> frozenset[str]:
+    """What is as sure as a name and has no size, or is in the best set of all and in no probable one with sizes."""
+    kept = {n for _, fit in names.fits for n in fit.names}
+    return frozenset(names.sizeless) | (frozenset(searched.best().names) - kept)
 
 
 def _explaining(names, best) -> set[str]:

@@ -70,6 +70,8 @@ SAME_BALANCE = 1e-6
 DOUBTED = 0.05
 # Probability that one of several causes is large enough to act on, from which their ambiguity is reported.
 ACTED_ON = 2 / 3
+# Standard deviations above which an effect has a size of its own in a set: with less the set says what others say too.
+SIZED = 1.0
 # Probability mass of the least probable sets, which are ignored.
 LEFT_OUT = 0.05
 # Least probability of an effect in an ambiguity.

@@ -30,12 +30,12 @@ def of_posterior(fit: FittedSet) -> float:
 class Judged:
     """{names: set}, each in its best linearisation.
 
-    allowed: the effects that a set may contain (None: all); around: sets of measurement errors around whose best set
-    others were judged; worth: what a possible set is ranked by.
+    around: sets of measurement errors around whose best set others were judged; worth: what a possible set is ranked
+    by.
     """
 
-    def __init__(self, setup: Setup, allowed=None, worth: Callable[[FittedSet], float] = of_posterior):
-        self.setup, self.allowed, self.worth = setup, allowed, worth
+    def __init__(self, setup: Setup, worth: Callable[[FittedSet], float] = of_posterior):
+        self.setup, self.worth = setup, worth
         self.fits: dict[Names, FittedSet] = {}
         self.around: set[frozenset[str]] = set()
 
@@ -61,7 +61,7 @@ class Judged:
         for names in (tuple(sorted(names)) for names in sets):
             known = self.fits.get(names)
             fresh = own or known is None or not known.own
-            if fresh and (self.allowed is None or self.allowed.issuperset(names)):
+            if fresh:
                 self._keep(fit_set(problem, names), own)
 
     def linearise(self, names: Names, steps=3):

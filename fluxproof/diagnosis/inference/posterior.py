@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,13 +16,12 @@ from fluxproof.diagnosis.inference.setup import Setup
 class Posterior:
     """All sets that were judged, the best linearisation of each.
 
-    idle: {effect: why it was taken out}; around: sets of measurement errors around whose best set others were judged;
-    agrees: whether the misfit may be no more than a recording of this kind has, so that there may be no cause.
+    around: sets of measurement errors around whose best set others were judged; agrees: whether the misfit may be no
+    more than a recording of this kind has, so that there may be no cause.
     """
 
     setup: Setup
     fits: Mapping[tuple[str, ...], FittedSet]
-    idle: Mapping[str, str] = field(default_factory=dict)
     around: frozenset[frozenset[str]] = frozenset()
     agrees: bool = True
 

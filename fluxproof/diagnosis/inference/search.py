@@ -8,7 +8,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 from fluxproof.diagnosis.inference import moves
@@ -25,22 +24,9 @@ def search(setup: Setup, progress=lambda text: None) -> Posterior:
     judged.judge(judged.first, [(), *((name,) for name in judged.first.able())])
     for move in moves.FIRST:
         move(judged, ())
-    return _refined(judged, {}, progress)
-
-
-def within(posterior: Posterior, allowed: Iterable[str], idle: Mapping[str, str]) -> Posterior:
-    """The posterior over sets of the effects ``allowed``; idle: {effect: why it is not among them}."""
-    only = frozenset(allowed)
-    judged = Judged(posterior.setup, only)
-    judged.fits = {names: fit for names, fit in posterior.fits.items() if only.issuperset(names)}
-    judged.around = set(posterior.around)
-    return _refined(judged, {**posterior.idle, **idle})
-
-
-def _refined(judged, idle, progress=lambda text: None) -> Posterior:
     until_it_stands(judged, moves.AROUND, ROUNDS, progress)
     until_it_stands(judged, moves.LAST, MOST_EFFECTS)
-    return Posterior(judged.setup, MappingProxyType(judged.fits), MappingProxyType(idle), frozenset(judged.around))
+    return Posterior(setup, MappingProxyType(judged.fits), frozenset(judged.around))
 
 
 def until_it_stands(judged: Judged, steps, rounds: int, progress=lambda text: None):

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from fluxproof.diagnosis.decide.decision import (
     CONSTANT,
-    HELD_OUT,
     IMITATION,
     INSIGNIFICANT,
     NOISE,
@@ -31,7 +30,7 @@ def notes_of(decision: Decision, effects) -> list[str]:
         *withheld(IMITATION),
         *_of_balance(decision, basis),
         *(f"The residual also looks {as_if(term)}." for term in decision.alike),
-        *withheld(CONSTANT, HELD_OUT, SIZELESS),
+        *withheld(CONSTANT, SIZELESS),
         *withheld(NOISE, INSIGNIFICANT),
         *minor_notes(decision.minor, effects),
         *_hint(decision.hinted),
@@ -43,7 +42,6 @@ def _withheld(w: Withheld, effects) -> str:
     why = {
         IMITATION: f"would explain {100 * w.size:.0f} %; not reported, as the large residual may imitate it.",
         CONSTANT: "would explain the drift; not reported, as the constant misfit is unexplained and may imitate it.",
-        HELD_OUT: "rejected, as it worsens the prediction at the held-out operating points.",
         SIZELESS: "not reported, as its size is compatible with zero in this recording.",
         NOISE: f"possible ({percent_below(w.size)}), but recording and simulation already agree within noise.",
         INSIGNIFICANT: f"possible ({percent_below(w.size)}), but not significant.",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What an effect has to explain to be named."""
+"""What size an effect has to have to be named, and in which sets it has one."""
 
 from types import SimpleNamespace
 
@@ -8,7 +8,7 @@ import pytest
 
 from cocotb_tests.support.drives import PAPER
 from fluxproof.diagnosis.catalogue import CATALOGUE
-from fluxproof.diagnosis.decide import held_out, likeliest
+from fluxproof.diagnosis.decide import likeliest
 from fluxproof.diagnosis.decide.names import Names
 from fluxproof.diagnosis.decide.relevant import relevant_names
 from fluxproof.diagnosis.decide.sized import has_size
@@ -77,34 +77,6 @@ def test_what_is_too_small_to_act_on_makes_no_verdict_and_hides_no_cause(name):
             assert bool(relevant_names(both, fit).ambiguous) is told
 
 
-def test_a_mean_torque_counts_beside_the_noise_of_its_ripple(monkeypatch):
-    """A friction was dropped as one part in a thousand of the voltage's noise fitted better without it."""
-    means, ripple, volts = np.arange(10), np.arange(10, 110), np.arange(110, 210)
-    left, fewer, noise = (np.zeros(210) for _ in range(3))
-    left[means], fewer[means], noise[means] = 0.2, 4.0, 0.6
-    left[ripple], fewer[ripple], noise[ripple] = 30.0, 30.0, 50.0
-    left[volts], fewer[volts], noise[volts] = 0.0900, 0.0899, 0.1
-    cells = SimpleNamespace(
-        channel=np.where(np.arange(210) < 110, "torque", "u"),
-        order=np.where((np.arange(210) >= 10) & (np.arange(210) < 110), 34.0, 0.0),
-        ok=np.ones(210, bool),
-        block=np.zeros(210, int),
-    )
-    setup = SimpleNamespace(cells=cells, usual=noise, load=0.0)
-    without = SimpleNamespace(names=(), left=lambda: fewer)
-    best = SimpleNamespace(
-        names=("a",),
-        left=lambda: left,
-        problem=SimpleNamespace(setup=setup),
-    )
-    monkeypatch.setattr(held_out, "fit_set", lambda problem, names: without)
-    monkeypatch.setattr(held_out, "_uncertain", lambda fit, rows: np.zeros(len(rows)))
-    posterior = SimpleNamespace(best=lambda: best, setup=setup)
-    assert held_out.helps(posterior, "a", np.ones(1, bool))
-    left[means] = 4.1  # it explains nothing there
-    assert not held_out.helps(posterior, "a", np.ones(1, bool))
-
-
 @pytest.mark.parametrize(("after", "against"), [(0.2, "fit as well"), (0.8, "leaves 80 %"), (1.4, "held-out points")])
 def test_the_best_fit_of_an_unexplained_misfit_is_told_with_what_speaks_against_it(monkeypatch, after, against):
     """Magnets that warm by 92 K were not mentioned, as held-out points lie beyond the fitted temperatures."""
@@ -116,5 +88,5 @@ def test_the_best_fit_of_an_unexplained_misfit_is_told_with_what_speaks_against_
     )
     monkeypatch.setattr(likeliest, "_left", lambda setup, y, held: y)
     monkeypatch.setattr(likeliest, "estimates_in", lambda fit, name: {})
-    found = likeliest.likeliest(searched, {}, None)
+    found = likeliest.likeliest(searched, frozenset(), None)
     assert [e.name for e in found.effects] == ["magnet_temperature"] and against in found.against
