@@ -186,7 +186,7 @@ class Protection:
     current_offset_a: float | None = positive("A", "mean of a phase at rest; 1 % of the rated current if none", None)
     heartbeat_s: float = not_negative("s", "longest time without a write of the host; 0: no limit", 0.0)
     brake_on_v: float | None = positive("V", "brake resistor on from this bus voltage; none: no brake resistor", None)
-    brake_off_v: float | None = positive("V", "off below this one; 97 % of brake_on_v if none", None)
+    brake_off_v: float | None = positive("V", "off below this one, above dc_bus_v; 97 % of brake_on_v if none", None)
     regen_start_v: float | None = positive("V", "braking current limited from this bus voltage; none: no limit", None)
     regen_end_v: float | None = positive("V", "no braking current from here on; midway to u_dc_max_v if none", None)
     trip_overcurrent: bool = flag("false: reported, no trip", True)

@@ -9,12 +9,14 @@ from golden_model.fluxproof import SAMPLE_INTERVAL
 from golden_model.formats import PU, VECTOR
 from golden_model.front_ends import check_converters, check_encoder
 from golden_model.motion import check_position
-from golden_model.protection_limits import default_u_dc_max_v, regen_end_v
+from golden_model.protection_limits import BRAKE_HYSTERESIS, default_u_dc_max_v, regen_end_v
 
 CARRIER_HALF_RANGE = (8, 32767)  # generic CARRIER_HALF of rtl/fluxproof.vhd
 ON_OF_DEAD, ON_S = 0.05, 20e-9  # shortest time that a switch is on: of the dead time, and at least
 TURN_SAMPLES = 4.0 * math.pi  # register t_s is a fraction of half a radian at the base of the speed
 LEAST_MARGIN_DEG = 30.0  # of the current loop; with less it rings
+HURTS = 1.5  # times the current limit
+LEAST_WATCHDOG = 3.0  # sample times that are always allowed without a sample
 WHOLE = 1e-6  # relative; a decimal fraction with seven digits counts as exact
 
 
@@ -280,16 +282,66 @@ def _protection(drive):
     if p.u_dc_max_v is not None and not bus < p.u_dc_max_v <= reach:
         allowed = f"above [inverter] dc_bus_v = {bus:g} V, up to [sensors] u_dc_range_v = {reach:g} V"
         _refuse("[protection] u_dc_max_v", p.u_dc_max_v, allowed)
-    if p.brake_off_v is not None and (p.brake_on_v is None or not p.brake_off_v < p.brake_on_v):
-        _refuse("[protection] brake_off_v", p.brake_off_v, f"below brake_on_v = {p.brake_on_v or 0.0:g} V")
     most = p.u_dc_max_v or default_u_dc_max_v(drive)
     if p.brake_on_v is not None and not bus < p.brake_on_v < most:
         allowed = f"above [inverter] dc_bus_v = {bus:g} V and below u_dc_max_v = {most:g} V, which trips"
         _refuse("[protection] brake_on_v", p.brake_on_v, allowed)
+    _brake_off(p, bus)
     if p.overspeed_rad_s is not None and not p.overspeed_rad_s > drive.machine.rated_speed_rad_s:
         _refuse("[protection] overspeed_rad_s", p.overspeed_rad_s, "above [machine] rated_speed_rad_s")
+    if p.trip_watchdog and not 1.0 < p.watchdog_periods <= (most := _watchdog_most(drive)):
+        allowed = (
+            f"above 1 up to {most:.3g}, while the current rises by half its limit; trip_watchdog = false ignores it"
+        )
+        _refuse("[protection] watchdog_periods", p.watchdog_periods, allowed)
     if not p.watchdog_periods > 1.0:
-        _refuse("[protection] watchdog_periods", p.watchdog_periods, "above 1; trip_watchdog = false ignores it")
+        _refuse("[protection] watchdog_periods", p.watchdog_periods, "above 1")
+    m = drive.machine
+    emf = m.pole_pairs * m.rated_speed_rad_s * m.magnet_flux_wb
+    if p.encoder_lost_v is not None and emf > 0.0 and not p.encoder_lost_v < emf:
+        _refuse("[protection] encoder_lost_v", p.encoder_lost_v, f"below {emf:.4g} V, the EMF at rated speed")
+
+
+def _brake_off(p, bus):
+    """The supply alone must not keep the brake resistor on."""
+    if p.brake_on_v is None:
+        if p.brake_off_v is not None:
+            raise DriveError("[protection] brake_off_v needs brake_on_v, from which the brake resistor is on")
+        return
+    if p.brake_off_v is None and not BRAKE_HYSTERESIS * p.brake_on_v > bus:
+        allowed = f"above {bus / BRAKE_HYSTERESIS:.4g} V, so that {BRAKE_HYSTERESIS:g} of it, where the resistor is off"
+        _refuse("[protection] brake_on_v", p.brake_on_v, f"{allowed} again, is above [inverter] dc_bus_v = {bus:g} V")
+    if p.brake_off_v is not None and not bus < p.brake_off_v < p.brake_on_v:
+        allowed = f"above [inverter] dc_bus_v = {bus:g} V, which keeps the resistor on, and below brake_on_v"
+        _refuse("[protection] brake_off_v", p.brake_off_v, f"{allowed} = {p.brake_on_v:g} V")
+
+
+def _watchdog_most(drive):
+    """Sample times without a sample in which the current rises by half its limit at rated speed.
+
+    The duties stand while the EMF turns on: L di/dt = psi omega (omega t), so i = psi omega**2 t**2 / (2 L).
+    """
+    m = drive.machine
+    omega, psi = m.pole_pairs * m.rated_speed_rad_s, m.magnet_flux_wb
+    if psi <= 0.0:
+        return math.inf
+    inductance, rise = min(m.inductance_d_h, m.inductance_q_h), (HURTS - 1.0) * drive.current_limit_a
+    return max(LEAST_WATCHDOG, math.sqrt(2.0 * inductance * rise / psi) / omega / drive.sample_time_s)
+
+
+def _bootstrap(drive):
+    """The lower switches short the motor while the bootstraps charge: a rotor that turns drives a current."""
+    m, given = drive.machine, drive.inverter.bootstrap_charge_s
+    omega = m.pole_pairs * m.rated_speed_rad_s
+    emf, inductance = omega * m.magnet_flux_wb, min(m.inductance_d_h, m.inductance_q_h)
+    steady = emf / math.hypot(m.resistance_ohm, omega * inductance)
+    limit = HURTS * drive.current_limit_a
+    if given <= 0.0 or steady <= limit:
+        return
+    most = limit * inductance / emf
+    if given > most:
+        allowed = f"up to {most:.3g} s: the lower switches short the motor, whose EMF at rated speed drives the current"
+        _refuse("[inverter] bootstrap_charge_s", given, f"{allowed} to {limit:g} A, {HURTS:g} times its limit")
 
 
 def _residual(drive):
@@ -319,6 +371,6 @@ def _regeneration(drive):
 
 RULES = (
     _sample_time, _sampling, _carrier, _pulses, _low_side, _position_pairs, _samples_per_turn, _voltage, _current,
-    _flux, _codes, _trip_filter, _speed_loop, _current_loop, _flux_loop, _adaline_steps, _protection, _regeneration,
-    _residual, check_encoder, check_converters, check_position,
+    _flux, _codes, _trip_filter, _speed_loop, _current_loop, _flux_loop, _adaline_steps, _protection, _bootstrap,
+    _regeneration, _residual, check_encoder, check_converters, check_position,
 )  # fmt: skip

@@ -228,6 +228,29 @@ def test_the_index_is_looked_for_before_the_encoder_is_believed(tmp_path, monkey
         assert "no index in 2.2 turns" in done.stderr
 
 
+@pytest.mark.parametrize("number", [signal.SIGQUIT, signal.SIGHUP, signal.SIGSEGV], ids=lambda n: n.name)
+@pytest.mark.parametrize("looks", [0, 60])
+def test_a_signal_leaves_nothing_behind(tmp_path, monkeypatch, looks, number):
+    """In the search of the index, too: the gates are off; the next run starts with the encoder's own angle."""
+    drive = drives.load(DRIVES / "servo_24v.toml")
+    program = compiled(tmp_path, drive, ROOT / "cocotb_tests" / "support" / "host" / "bus_memory.c")
+    monkeypatch.setenv("FLUXPROOF_INDEX_AFTER", str(looks))
+    monkeypatch.setenv("FLUXPROOF_SIGNAL", str(int(number)))
+    done = subprocess.run([program, "0"], capture_output=True, text=True)
+    assert done.returncode == 1 and "gates off" in done.stderr, done.stdout + done.stderr
+
+
+def test_a_closed_output_does_not_leave_the_motor_running(tmp_path, monkeypatch):
+    """`bring_up | head -3`."""
+    drive = drives.load(DRIVES / "servo_24v.toml")
+    program = compiled(tmp_path, drive, ROOT / "cocotb_tests" / "support" / "host" / "bus_memory.c")
+    monkeypatch.setenv("FLUXPROOF_INDEX_AFTER", "60")
+    running = subprocess.Popen([program, "0"], stdout=subprocess.PIPE)
+    assert running.stdout
+    running.stdout.close()
+    assert running.wait(timeout=60) == 0
+
+
 @pytest.mark.parametrize("references", [False, True])
 def test_torque_in_newton_metres_with_and_without_the_table(tmp_path, monkeypatch, references):
     """The torque read back is the one asked for, the search of the index and a current leave the table out."""

@@ -85,7 +85,7 @@ WRONG = {  # section, line, what the message must contain besides the file's nam
         "above 16000 Hz or [core] updates_per_period = 2",
     ),
     "too few for two updates": ("machine", "rated_speed_rad_s = 4e3", "make 3.927 samples", "above 32000 Hz\n"),
-    "slow clock": ("core", "clock_hz = 1e5", "[core] clock_hz", "8 to 32767"),
+    "slow clock": ("core", "clock_hz = 1e5", "[core] clock_hz", "above 160000"),
     "tiny pwm": ("core", "clock_hz = 1e12", "[core] clock_hz", "8 to 32767"),
     "dead time": ("inverter", "dead_time_s = 3e-6", "[inverter] dead_time_s", "below min_pulse_s = 3e-06 s"),
     "dead time in us": ("inverter", "dead_time_s = 300", "[inverter] dead_time_s = 300", "half a PWM period, 5e-05 s"),
@@ -299,7 +299,7 @@ def test_contradictions_are_found_without_a_file():
     drive = load(PAPER)
     with pytest.raises(DriveError, match="min_pulse_s"):
         dataclasses.replace(drive, inverter=dataclasses.replace(drive.inverter, min_pulse_s=1e-6))
-    with pytest.raises(DriveError, match="whole number from 8 to 32767"):
+    with pytest.raises(DriveError, match="a PWM period has 14 clocks"):
         with_carrier(drive, 7)
     assert isinstance(with_carrier(drive, 8), Drive)
     with pytest.raises(DriveError, match=r"the current limit = 5.23 .* up to 4.125 A, 1.375 \* \[bases\] current_a"):

@@ -258,10 +258,17 @@ def test_protection_keys(tmp_path):
     ("brake_on_v = 735", r"brake_on_v = 735 is out of range: .* below u_dc_max_v = 731.9 V, which trips"),
     ("regen_end_v = 600", r"regen_end_v needs regen_start_v"),
     ("u_dc_max_v = 500", r"u_dc_max_v = 500 is out of range: allowed is above \[inverter\] dc_bus_v"),
-    ("watchdog_periods = 1", "watchdog_periods = 1 is out of range: allowed is above 1; trip_watchdog = false"),
+    ("watchdog_periods = 1", "watchdog_periods = 1 is out of range: allowed is above 1 up to .*; trip_watchdog"),
+    ("watchdog_periods = 200", "watchdog_periods = 200 is .* while the current rises by half its limit"),
+    ("watchdog_periods = 1\ntrip_watchdog = false", "watchdog_periods = 1 is out of range: allowed is above 1$"),
+    ("brake_on_v = 600\nbrake_off_v = 560", r"brake_off_v = 560 .* dc_bus_v = 563 V, which keeps the resistor on"),
+    ("brake_on_v = 570", r"brake_on_v = 570 is out of range: allowed is above 580.4 V, .* is above .* 563 V"),
+    ("brake_off_v = 580", "brake_off_v needs brake_on_v"),
+    ("encoder_lost_v = 1e5", "encoder_lost_v = 100000 is .* the EMF at rated speed"),
     ("rail_samples = 16", "rail_samples = 16 is out of range: allowed is 1 up to 15"),
     ("watchdog = 3", "unknown key watchdog; the nearest known one is trip_watchdog"),
 ])  # fmt: skip
 def test_contradictions_are_refused(tmp_path, line, words):
+    """Also what is valid and blinds a protection, or keeps the brake resistor on."""
     with pytest.raises(DriveError, match=words):
         drives.load(with_protection(tmp_path, line))

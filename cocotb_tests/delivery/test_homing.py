@@ -41,9 +41,9 @@ def axis(tmp_path_factory):
 def test_the_home_is_the_edge_or_the_zero_before_it(axis, direction, start):
     """Started before the switch, at it and beyond it; the speed of moves is afterwards as before."""
     place = round(direction * 2.4 * TURN)
-    result, home, speed, _ = axis(round(start * TURN), place, direction, False)
-    assert result == 0 and 0 <= direction * (home - place) <= SLOW and speed == 12345
-    result, home, _, _ = axis(round(start * TURN), place, direction, True)
+    result, home, speed, on, _ = axis(round(start * TURN), place, direction, False)
+    assert result == 0 and 0 <= direction * (home - place) <= SLOW and (speed, on) == (12345, 1)
+    result, home, *_ = axis(round(start * TURN), place, direction, True)
     assert (result, home) == (0, direction * 2 * TURN)
 
 
@@ -51,6 +51,7 @@ def test_the_home_is_the_edge_or_the_zero_before_it(axis, direction, start):
     ("fault", "place", "says"),
     [
         ("bus", 2.4, "an access to the core failed"),
+        ("lost", 2.4, "an access to the core failed"),
         ("built", 2.4, "the core was built without a position loop"),
         ("trip", 2.4, "the gates are off, or a trip came"),
         ("index", 2.4, "the encoder has not found its index"),
@@ -62,4 +63,6 @@ def test_the_home_is_the_edge_or_the_zero_before_it(axis, direction, start):
     ],
 )
 def test_what_prevents_it_is_told_by_name(axis, fault, place, says):
-    assert axis(0, round(place * TURN), 1, True, fault)[3] == says
+    """Where the core cannot be read any more the shaft must not run on to the end of its search: the gates go off."""
+    _, _, _, on, said = axis(0, round(place * TURN), 1, True, fault)
+    assert said == says and on == (fault not in ("bus", "lost"))

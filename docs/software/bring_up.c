@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /* Brings a drive up over its registers: is it the right core, load the drive, check, find the index, enable, ramp the speed or the
  * torque current up and down, read back, stop.  The gates are off before it starts and, whatever goes wrong, when it
- * ends: Ctrl-C, SIGTERM and a bus error included.  With an A/B/Z encoder it first looks for the index: the shaft turns.
+ * ends: signals and a bus error included.  What cannot be caught (SIGKILL, a host that hangs) only a heartbeat ends:
+ * [protection] heartbeat_s.  With an A/B/Z encoder it first looks for the index: the shaft turns.
  *
  *   fluxproof registers drive.toml --format c > drive_registers.h
  *   cc -Wall -Wextra -I docs/software -I . docs/software/bring_up.c docs/software/bus_uio.c -lm -o bring_up
@@ -36,10 +37,22 @@ static volatile sig_atomic_t asked_to_stop; /* the number of the signal */
 
 /* ------------------------------------------------------------------ small helpers */
 
+/* The gates off; then the encoder's own angle again, with every fault of the front ends, whoever left them otherwise. */
+static bool rest(void)
+{
+    bool done = bus_write(AT(enable), 0);
+#ifdef FLUXPROOF_ENCODER
+    done = bus_write(AT(forced_rate), 0) && done;
+    done = bus_write(AT(position_source), 0) && done;
+    done = bus_write(AT(board_ignore), 0) && done;
+#endif
+    return done;
+}
+
 /* Turn the gates off before printing the message. */
 static void fail(const char *format, ...)
 {
-    bus_write(AT(enable), 0);
+    rest();
     va_list arguments;
     va_start(arguments, format);
     fputs("bring_up: ", stderr);
@@ -49,32 +62,33 @@ static void fail(const char *format, ...)
     exit(1);
 }
 
-/* Ctrl-C or SIGTERM: noticed at the next access, so that none is cut in half. */
+/* Ctrl-C, Ctrl-\, SIGTERM or a terminal that is closed: noticed at the next access, so that none is cut in half. */
 static void note_signal(int number)
 {
     asked_to_stop = number;
 }
 
-/* A bus error leaves no way back into the access: gates off here.  A second one ends the process. */
-static void on_bus_error(int number)
+/* A bus error or a fault of the program leaves no way back: gates off here.  A second one ends the process. */
+static void on_error(int number)
 {
-    static const char message[] = "bring_up: bus error, gates off\n";
-    (void)number;
+    static const char bus[] = "bring_up: bus error, gates off\n", other[] = "bring_up: a fault of the program, gates off\n";
     bus_write(AT(enable), 0);
-    if (write(STDERR_FILENO, message, sizeof message - 1) < 0)
+    if (write(STDERR_FILENO, number == SIGBUS ? bus : other, number == SIGBUS ? sizeof bus - 1 : sizeof other - 1) < 0)
         _exit(2);
     _exit(1);
 }
 
 static void catch_signals(void)
 {
-    struct sigaction stop = {.sa_handler = note_signal}, error = {.sa_handler = on_bus_error};
+    const int stops[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT}, errors[] = {SIGBUS, SIGSEGV, SIGFPE, SIGILL, SIGABRT};
+    struct sigaction stop = {.sa_handler = note_signal}, error = {.sa_handler = on_error};
     stop.sa_flags = SA_RESTART;
     error.sa_flags = SA_RESETHAND | SA_NODEFER;
-    sigaction(SIGINT, &stop, NULL);
-    sigaction(SIGTERM, &stop, NULL);
-    sigaction(SIGHUP, &stop, NULL);
-    sigaction(SIGBUS, &error, NULL);
+    for (size_t k = 0; k < COUNT(stops); k++)
+        sigaction(stops[k], &stop, NULL);
+    for (size_t k = 0; k < COUNT(errors); k++)
+        sigaction(errors[k], &error, NULL);
+    signal(SIGPIPE, SIG_IGN); /* `| head` closes the output, which is no reason to leave the motor running */
 }
 
 static void heed_signals(void)
@@ -174,7 +188,8 @@ static void check_generics(void)
 
 static void load_drive(bool speed_mode)
 {
-    put(AT(enable), 0);
+    if (!rest())
+        fail("the core refused to be put to rest");
     put(AT(omega_ref), 0);
     put(AT(i_d_ref), 0);
     put(AT(i_q_ext), 0);
@@ -204,6 +219,8 @@ static void check_at_rest(void)
         fail("a current code is at its end: is the converter connected?");
     if (flag(FLUXPROOF__FLAGS__U_DC_LOW_bm))
         fail("no bus voltage");
+    if (flag(FLUXPROOF__FLAGS__TRIPPED_bm)) /* whoever starts this in a loop sees what it clears */
+        printf("tripped before by first_fault 0x%02x, cleared\n", (unsigned)get(AT(first_fault)));
     put(AT(clear_trip), 1);
     put(AT(clear_faults), 1);
     wait_us(1000);
@@ -336,7 +353,7 @@ static void find_index(void)
     put(AT(forced_rate), (uint32_t)lround(4294967296.0 * FLUXPROOF_BASE_SAMPLE_TIME_S / turn_s));
     bool found = false;
     for (int k = 0; k < turns * turn_s * 1e6 / STEP_US && !found; k++) {
-        wait_us(STEP_US);
+        wait_writing(STEP_US, AT(i_d_ref), most);
         check_running(HUGE_VAL);
         found = get(AT(encoder_flags)) & 1;
     }

@@ -47,13 +47,15 @@ static enum homing look(const struct homing_plan *plan, int32_t *position)
     return size(error) > plan->error_most ? HOMING_BLOCKED : HOMED;
 }
 
-/* Until the shaft has not moved for some looks. */
-static enum homing rest(const struct homing_plan *plan)
+/* Until the shaft has not moved for some looks; each writes the target again, which is what a heartbeat wants. */
+static enum homing rest(const struct homing_plan *plan, int32_t target)
 {
     int32_t before, position;
     enum homing result = look(plan, &before);
     for (int calm = 0; result == HOMED && calm < REST_LOOKS;) {
         wait_us(plan->poll_us);
+        if (!put(AT(position_target), target))
+            return HOMING_BUS_ERROR;
         result = look(plan, &position);
         calm = size((int64_t)position - before) <= 2 ? calm + 1 : 0;
         before = position;
@@ -67,7 +69,7 @@ static enum homing hold(const struct homing_plan *plan)
     int32_t position;
     if (!get(AT(shaft_position), &position) || !put(AT(position_target), position))
         return HOMING_BUS_ERROR;
-    return rest(plan);
+    return rest(plan, position);
 }
 
 /* Moves in a direction until the switch is as wanted; ``edge``: where that was. */
@@ -77,9 +79,12 @@ static enum homing search(const struct homing_plan *plan, int32_t direction, uin
     enum homing result = look(plan, &start);
     if (result != HOMED)
         return result;
-    if (!put(AT(move_speed), (int32_t)speed) || !put(AT(position_target), plus(start, (int64_t)direction * plan->most)))
+    int32_t target = plus(start, (int64_t)direction * plan->most);
+    if (!put(AT(move_speed), (int32_t)speed))
         return HOMING_BUS_ERROR;
     for (;;) {
+        if (!put(AT(position_target), target))
+            return HOMING_BUS_ERROR;
         bool there = plan->closed(plan->switch_) == wanted;
         result = look(plan, edge);
         if (result != HOMED || there)
@@ -128,7 +133,7 @@ static enum homing sequence(const struct homing_plan *plan, int32_t *home)
     return plan->at_index ? zero_before(plan, edge, home) : HOMED;
 }
 
-enum homing homing(const struct homing_plan *plan, int32_t *home)
+static enum homing begun(const struct homing_plan *plan, int32_t *home)
 {
     int32_t built, position, speed;
     if (!get(AT(position_loop), &built) || !get(AT(move_speed), &speed))
@@ -142,6 +147,14 @@ enum homing homing(const struct homing_plan *plan, int32_t *home)
         return HOMING_BUS_ERROR;
     result = sequence(plan, home);
     return put(AT(move_speed), speed) ? result : HOMING_BUS_ERROR;
+}
+
+enum homing homing(const struct homing_plan *plan, int32_t *home)
+{
+    enum homing result = begun(plan, home);
+    if (result == HOMING_BUS_ERROR) /* nobody sees the switch any more, and a search would run on to its end */
+        bus_write(AT(enable), 0);
+    return result;
 }
 
 const char *homing_says(enum homing result)

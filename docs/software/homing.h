@@ -10,7 +10,7 @@
 
 enum homing {
     HOMED,
-    HOMING_BUS_ERROR,        /* an access failed */
+    HOMING_BUS_ERROR,        /* an access failed: enable = 0 was written */
     HOMING_NO_POSITION_LOOP, /* the core was built with POSITION_LOOP = 0 */
     HOMING_NOT_RUNNING,      /* the gates are off, or a trip came */
     HOMING_NO_INDEX,         /* the encoder has not found its zero, without which a turn has none */
@@ -25,7 +25,7 @@ struct homing_plan {
     int32_t most;                 /* longest way of a search, 2^-18 turns of the shaft */
     int32_t error_most;           /* of position_error, the same unit */
     uint32_t fast, slow;          /* speeds of both searches as the register move_speed: 2^-34 turns per sample */
-    uint32_t poll_us;             /* from look to look; the edge is known to slow*poll */
+    uint32_t poll_us;             /* from look to look; the edge is known to slow*poll; shorter than heartbeat_s */
     bool at_index;                /* false: home is the edge; true: the encoder's zero before the switch */
     bool absolute;                /* true: the encoder needs no index (SSI, BiSS-C, EnDat, external code) */
     bool (*closed)(void *switch_); /* the switch, from wherever the board has it */

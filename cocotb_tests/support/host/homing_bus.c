@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /* An axis for docs/software/homing.c: a shaft that follows position_target at move_speed, a switch, a stop.
- * homing_bus START SWITCH DIRECTION AT_INDEX FAULT: positions in 2^-18 turns; prints the result's name and the home. */
+ * homing_bus START SWITCH DIRECTION AT_INDEX FAULT: positions in 2^-18 turns; prints the result, the home, move_speed, enable, and the result's name. */
 
 #include "../../../docs/software/homing.c"
 
@@ -31,6 +31,8 @@ bool bus_read(uint32_t offset, uint32_t *value)
         *value = !is("built");
     else if (offset == AT(flags))
         *value = is("trip") && ++looks > 50 ? FLUXPROOF__FLAGS__TRIPPED_bm : FLUXPROOF__FLAGS__RUNNING_bm;
+    else if (offset == AT(shaft_position) && is("lost") && ++looks > 50)
+        return false;
     else if (offset == AT(shaft_position))
         *value = (uint32_t)shaft;
     else if (offset == AT(position_error))
@@ -59,10 +61,11 @@ int main(int argc, char **argv)
         return 2;
     shaft = atoi(argv[1]), place = atoi(argv[2]), direction = atoi(argv[3]), fault = argv[5];
     words[AT(move_speed) / 4] = 12345;
+    words[AT(enable) / 4] = 1;
     struct homing_plan plan = {.direction = direction, .most = 8 * TURN, .error_most = 1000, .fast = 1 << 24,
                                .slow = 1 << 18, .poll_us = 1000, .at_index = atoi(argv[4]) != 0, .closed = closed};
     int32_t home = 0;
     enum homing result = homing(&plan, &home);
-    printf("%d %d %d: %s\n", (int)result, home, words[AT(move_speed) / 4], homing_says(result));
+    printf("%d %d %d %d: %s\n", (int)result, home, words[AT(move_speed) / 4], words[AT(enable) / 4], homing_says(result));
     return 0;
 }
