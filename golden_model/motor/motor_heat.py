@@ -176,7 +176,10 @@ def stimuli(_rng, config):
 
 
 def patient_stimuli(rng, config):
-    """Windows of any values that no limit hides: a factor within its range, of either sign and any size."""
+    """Windows of any values that no limit hides: a factor within its range, of either sign and any size.
+
+    Then many windows without a start, in which what an output does not show adds up.
+    """
     window, rows, one = 1 << min(config["WINDOW_BITS"], 5), [], 1 << TCR.frac_bits
     for k in range(200):
         row = {p.name: int(rng.integers(p.high + 1)) >> int(rng.integers(1, 4)) for p in REGISTERS}
@@ -189,6 +192,17 @@ def patient_stimuli(rng, config):
         rows.append(row | {"start": 1})
         for _ in range(3 * window):
             rows.append(row | {f"i_{x}": int(rng.integers(PU.lo, PU.hi + 1)) >> k % 5 for x in "abc"})
+    for sign in (1, -1, 1, -1):
+        row = {p.name: int(rng.integers(p.high // 2)) for p in REGISTERS}
+        row |= {
+            "ambient": sign * 100 << CELSIUS.frac_bits,
+            "t_ref": 0,
+            "tcr_winding": one // 250,
+            "tcr_magnet": one // 250,
+        }
+        rows.append(row | {"start": 1})
+        for _ in range(300 * window):
+            rows.append(row | {f"i_{x}": int(rng.integers(PU.lo, PU.hi + 1)) for x in "abc"})
     return rows
 
 
