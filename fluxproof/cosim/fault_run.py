@@ -348,7 +348,7 @@ def edges_run() -> FaultRun:
             inputs[name][:] = 1 << 15
         inputs["code_a_in"][:] = (1 << 16) - 1 if begin <= k < begin + 6 else 1 << 15
         inputs["code_u_dc_in"][:] = 46000 if k in (29, 30) else 1 << 15  # 702 V: the brake resistor is on
-        inputs["trip"][70:71] = k == 20 + HEARTBEAT + 11
+        inputs["trip"][70:71] = k in (20 + HEARTBEAT + 11, tripped)
 
     begin, usual = max(script) + 2, board_registers(edges())
     unknown: Steps = [
@@ -356,7 +356,11 @@ def edges_run() -> FaultRun:
         ({"board_ignore": INDEX | NO_INDEX | HALL}, 2), ({"board_ignore": INDEX}, 3),
         ({"board_ignore": INDEX | NO_INDEX}, 0), ({"clear_trip": 1}, 1),
     ]  # fmt: skip
+    # Then the pin alone, the first of all faults, read while it stands
+    alone = REGISTERS["fault_ignore"].high & ~(1 << NAMES.index("trip"))
+    pin: Steps = [({"fault_ignore": alone, "clear_trip": 1}, 1), ({"clear_trip": 1}, 1), ({"irq_clear": 15}, 8)]
     patient = [*rail(), ({"clear_trip": 1}, 7), *each_fault(edges(), 3), *each_mask(usual), *unknown]
-    run = FaultRun(edges(), script, pins, patient)
+    tripped = begin + sum(1 + idle for _, idle in patient) + 5
+    run = FaultRun(edges(), script, pins, [*patient, *pin, ({"clear_trip": 1}, 1)])
     stands = run.periods * run.length  # clock from which the shaft stands
     return run

@@ -52,7 +52,7 @@ SAMPLES = Format(0, 12, 0)
 SAMPLES_HI, PU_HI = SAMPLES.hi, PU.hi
 MEAN = 7  # 2**MEAN samples
 RESIDUAL_W, SUM_W = RESIDUAL.width, SUM.width
-FOLLOWED = 250  # samples of the stimuli
+FOLLOWED, PATIENT = 250, 4000  # samples of the stimuli
 DROP_TRIG = TRIG.frac_bits
 DROP_TWICE = TRIG.frac_bits - 1
 DROP_LAMBDA = FLUX.frac_bits + TRIG.frac_bits - FLUX_STATE.frac_bits
@@ -324,17 +324,17 @@ def stimuli(rng, _config):
             rows += [push | {"residual_sum_max": min(least, SUM_LEAST.hi)}] * 8
             rows += [push | {"i_q": 4096, "residual_sum_i": min(least << 12, SUM_OF_I.hi)}] * 8
         rows += [push | {"i_b": PU.hi, "i_c": PU.hi}, push | {"i_b": PU.lo, "i_c": PU.lo}, rest | {"run": 0}, rest]
-    return rows + _followed(rng, rest)
+    return rows + _followed(rng, rest, FOLLOWED)
 
 
-def _followed(rng, rest):
+def _followed(rng, rest, count):
     """Limits of flux, voltage and multiples of the angle, each followed by a flux that leaves a residual within range.
 
     A residual at its own limit hides what went before it.  Cosine and sine need not be those of an angle.
     """
     rows, state = [], State()
     ends = {p.name: p.high for p in INPUTS if p.name in ("u_applied_alpha", "u_applied_beta", "s_alpha", "s_beta")}
-    for k in range(FOLLOWED):
+    for k in range(count):
         shift, beyond = int(rng.integers(20)), (state.carried_alpha >> 30, state.carried_beta >> 30)
         signs = [int(rng.choice((-1, 1))) if -2 <= b <= 1 else -1 if b > 0 else 1 for b in (*beyond, *beyond)]
         row = rest | {n: int(rng.integers(-TRIG_ONE, TRIG_ONE + 1)) for n in ("cos_theta", "sin_theta")}
@@ -357,9 +357,42 @@ def _followed(rng, rest):
         flux = wanted / turn * (1 << DROP_LAMBDA)
         for x, part in (("d", flux.real), ("q", flux.imag)):
             row[f"model_{x}"] = min(max(round(part), FLUX.lo), FLUX.hi) << DROP_MODEL
-        state, _ = step(state, Inputs(*(row[p.name] for p in INPUTS)), Registers(*(row[p.name] for p in REGISTERS)))
+        state, _ = step(state, *_taken(row))
         rows.append(row)
     return [rest | {"run": 0}, *rows]
+
+
+def patient_stimuli(rng, _config):
+    """As the followed ones, more of them, each with its limits beside what it compares with them."""
+    rest = {p.name: 0 for p in INPUTS + REGISTERS} | {"run": 1, "voltage_known": 1, "cos_theta": TRIG_ONE}
+    rows, state = [], State()
+    for k, row in enumerate(_followed(rng, rest, PATIENT)):
+        row = row | {n: int(rng.integers(PU.lo, PU.hi + 1)) >> k % 6 for n in ("i_a", "i_b", "i_c", "i_d", "i_q")}
+        row |= {
+            "omega_me": int(rng.integers(PU.lo, PU.hi + 1)),
+            "residual_samples": min(max(state.count + k % 4 - 1, 1), SAMPLES_HI),
+        }
+        following, _ = step(state, *_taken(row))
+        size = length(following.sum_d >> MEAN, following.sum_q >> MEAN)
+        speed, current = abs(row["omega_me"]), min(length(row["i_d"], row["i_q"]), PU_HI)
+        shares = rng.dirichlet((1.0, 1.0, 1.0)) * size
+        beside = int(rng.integers(-1, 2))
+        row["residual_w"] = min((int(shares[0]) << DROP_OMEGA) // (speed + 1), OF_OMEGA.hi)
+        row["residual_i"] = min((int(shares[1]) << DROP_I) // (current + 1), OF_I.hi)
+        left = size - (speed * row["residual_w"] >> DROP_OMEGA) - (current * row["residual_i"] >> DROP_I)
+        row["residual_min"] = min(max(left + beside, 0), LEAST.hi)
+        total = following.sum_sum >> DROP_SUM
+        row["residual_sum_i"] = min((int(total * rng.random()) << DROP_SUM_I) // (current + 1), SUM_OF_I.hi)
+        left = total - (current * row["residual_sum_i"] >> DROP_SUM_I)
+        row["residual_sum_max"] = min(max(left + (k // 3 % 3 - 1), 0), SUM_LEAST.hi)
+        state, _ = step(state, *_taken(row))
+        rows.append(row)
+    return rows
+
+
+def _taken(row):
+    """The records that step takes."""
+    return Inputs(*(row[p.name] for p in INPUTS)), Registers(*(row[p.name] for p in REGISTERS))
 
 
 BLOCK = Block(
@@ -395,4 +428,5 @@ BLOCK = Block(
     reference=reference,
     bound=bound,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )

@@ -175,6 +175,37 @@ def stimuli(_rng, config):
     return rows
 
 
+def patient_stimuli(rng, config):
+    """Windows of any values that no limit hides: a factor within its range, of either sign and any size.
+
+    Then many windows without a start, in which what an output does not show adds up.
+    """
+    window, rows, one = 1 << min(config["WINDOW_BITS"], 5), [], 1 << TCR.frac_bits
+    for k in range(200):
+        row = {p.name: int(rng.integers(p.high + 1)) >> int(rng.integers(1, 4)) for p in REGISTERS}
+        row |= {"ambient": int(rng.integers(CELSIUS.lo, CELSIUS.hi + 1)) >> k % 3, "psi_m": int(rng.integers(FLUX.hi))}
+        apart = int(rng.choice((-1, 1))) * int(rng.integers(1, 400 << CELSIUS.frac_bits)) >> k % 7
+        row["t_ref"] = min(max(row["ambient"] + apart, CELSIUS.lo), CELSIUS.hi)
+        most = one * (1 << CELSIUS.frac_bits) // max(abs(apart), 1)  # a factor of one
+        for name in ("tcr_winding", "tcr_magnet"):
+            row[name] = min(int(rng.integers(most + 1)), TCR.hi)
+        rows.append(row | {"start": 1})
+        for _ in range(3 * window):
+            rows.append(row | {f"i_{x}": int(rng.integers(PU.lo, PU.hi + 1)) >> k % 5 for x in "abc"})
+    for sign in (1, -1, 1, -1):
+        row = {p.name: int(rng.integers(p.high // 2)) for p in REGISTERS}
+        row |= {
+            "ambient": sign * 100 << CELSIUS.frac_bits,
+            "t_ref": 0,
+            "tcr_winding": one // 250,
+            "tcr_magnet": one // 250,
+        }
+        rows.append(row | {"start": 1})
+        for _ in range(300 * window):
+            rows.append(row | {f"i_{x}": int(rng.integers(PU.lo, PU.hi + 1)) for x in "abc"})
+    return rows
+
+
 INPUTS = (
     *(Port(f"i_{x}", PU, doc=f"current of phase {x}") for x in "abc"),
     Port("start", BIT, doc="1: all is as warm as the ambient"),
@@ -218,4 +249,5 @@ BLOCK = Block(
     reference=reference,
     bound=bound,
     stimuli=stimuli,
+    patient_stimuli=patient_stimuli,
 )  # fmt: skip
