@@ -8,6 +8,8 @@ from fluxproof.diagnosis.decide.sizes import Sizes, measured_torque
 from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.result import BestFit, NamedEffect
 
+NO_SIZE, WORSE = AGAINST = ("its size is compatible with zero", "held-out points are worse with it")
+
 
 def likeliest(searched, sizeless, held) -> BestFit | None:
     """The best fit among the sets that a simulation has parameters for; None if no effect is more probable than none.
@@ -35,9 +37,9 @@ def _left(setup, y, held) -> float:
 def _against(p, fit, sizeless, share) -> str:
     """Why the best fit is not asserted; share: of the misfit's rms that it leaves."""
     if sizeless.intersection(fit.names):
-        return "its size is compatible with zero"
+        return NO_SIZE
     if share >= 1.0:
-        return "held-out points are worse with it"
+        return WORSE
     if 1.0 - share**2 < k.HALF:
         return f"it leaves {100 * share:.0f} % of the misfit"
     return "other sets of effects fit as well" if p < 1.0 - k.DOUBTED else "the residual may imitate it"
