@@ -313,7 +313,7 @@ def _regeneration(drive):
 
 
 RULES = (
-    _sample_time, _sampling, _carrier, _pulses, _low_side, _overmodulation, _position_pairs, _samples_per_turn, _voltage, _current,
-    _flux, _codes, _trip_filter, _speed_loop, _current_loop, _flux_loop, _adaline_steps, _protection, _regeneration,
-    _residual, check_encoder, check_converters, check_position,
+    _sample_time, _sampling, _carrier, _pulses, _low_side, _overmodulation, _position_pairs, _samples_per_turn,
+    _voltage, _current, _flux, _codes, _trip_filter, _speed_loop, _current_loop, _flux_loop, _adaline_steps,
+    _protection, _regeneration, _residual, check_encoder, check_converters, check_position,
 )  # fmt: skip

@@ -53,8 +53,8 @@ from golden_model.estimators import (
     winding_resistance,
 )
 from golden_model.estimators.flux_models import CURRENT_MODEL
-from golden_model.fixed import Format
-from golden_model.formats import PU
+from golden_model.fixed import Format, saturate
+from golden_model.formats import PU, PU_W
 from golden_model.io import (
     brake_chopper,
     current_conditioning,
@@ -116,7 +116,10 @@ WIRING = {
     "compensation_dq": (park, ("leg_compensation", "trig")),
     "direction_functions": (park, ("trig",)),
     "ripple_answer": (ripple_voltage, ("trig", "speed_measurement")),
-    "circle": (voltage_limit, ("current_regulators", "cross_coupling", "compensation_dq", "bus_voltage", "ripple_answer")),
+    "circle": (
+        voltage_limit,
+        ("current_regulators", "cross_coupling", "compensation_dq", "bus_voltage", "ripple_answer"),
+    ),
     "hexagon": (
         overmodulation,
         ("current_regulators", "cross_coupling", "compensation_dq", "bus_voltage", "ripple_answer", "bus_reciprocal"),
@@ -566,23 +569,22 @@ def step_table(state, sample, regs, config, of_speed, table):
     (omega_chord,) = chord_speed.step(omega_me, r.k_chord)
     u_dec_d, u_dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
     asked_d, asked_q, turned_d, turned_q = u_pi_d, u_pi_q, u_dec_d, u_dec_q
-    if by_voltage:
-        asked_d, asked_q, turned_d, turned_q = begun.u_d_now, begun.u_q_now, 0, 0
-    added_d, added_q = given.u_comp_d, given.u_comp_q
     if c.overmodulation:
         u_rip_d, u_rip_q = ripple_voltage.step(
             state.rip_alpha, state.rip_beta, cos_theta, sin_theta, omega_me, r.k_ripple
         )
-        added_d, added_q = added_d + u_rip_d, added_q + u_rip_q
+        turned_d, turned_q = saturate(u_dec_d + u_rip_d, PU_W), saturate(u_dec_q + u_rip_q, PU_W)
+    if by_voltage:
+        asked_d, asked_q, turned_d, turned_q = begun.u_d_now, begun.u_q_now, 0, 0
     voltage_limit_state, (u_d, u_q, sat_d, sat_q) = voltage_limit.step(
-        state.of_voltage_limit, asked_d, asked_q, turned_d, turned_q, added_d, added_q, u_max, lambda_d
+        state.of_voltage_limit, asked_d, asked_q, turned_d, turned_q, given.u_comp_d, given.u_comp_q, u_max, lambda_d
     )
 
     u_alpha, u_beta = inverse_park.step(u_d, u_q, cos_out, sin_out)
     hexagon_state, inverse_used, inverse_beta_used = state.of_overmodulation, inverse, inverse_beta
     if c.overmodulation:
         hexagon_state, (inverse_used, inverse_beta_used) = overmodulation.step(
-            state.of_overmodulation, asked_d, asked_q, turned_d, turned_q, added_d, added_q, u_max, inverse, inverse_beta
+            state.of_overmodulation, u_d, asked_q, turned_q, given.u_comp_q, u_max, inverse, inverse_beta
         )
     duty_a, duty_b, duty_c = svm.step(u_alpha, u_beta, inverse_used, inverse_beta_used)
     compare_a, compare_b, compare_c = pwm_compare.step(
@@ -632,7 +634,7 @@ def step_table(state, sample, regs, config, of_speed, table):
         references_state, (_, _, _, _, _, _, _, _, u_rest_d, u_rest_q) = mode_references.step(
             state.of_mode_references,
             mode_references.Inputs(
-                u_d=u_d, u_q=u_q, u_dec_d=u_dec_d, u_dec_q=u_dec_q, u_comp_d=added_d, u_comp_q=added_q,
+                u_d=u_d, u_q=u_q, u_dec_d=u_dec_d, u_dec_q=u_dec_q, u_comp_d=given.u_comp_d, u_comp_q=given.u_comp_q,
                 i_d=i_d, i_q_made=made, i_d_source=i_d_source, i_q_ext=x.i_q_ext, torque_ref=torque_ref,
                 omega_me=omega_me, omega_ref=x.omega_ref, by_voltage=by_voltage, by_speed=by_speed, regulates=regulates,
                 run=x.run,
@@ -700,8 +702,9 @@ def step_table(state, sample, regs, config, of_speed, table):
         of_position_control=position_state, of_position_trajectory=trajectory_state, position_ref=position_ref,
         omega_ff=omega_ff, torque_ff=torque_ff, at_rest=at_rest,
         of_motor_residual=after.of_motor_residual, of_mode_change=modes_state, of_mode_references=references_state,
-        u_rest_d=u_rest_d, u_rest_q=u_rest_q, of_overmodulation=hexagon_state, of_voltage_ripple=after.of_voltage_ripple,
-        u_alpha=u_alpha, u_beta=u_beta, rip_alpha=after.rip_alpha, rip_beta=after.rip_beta,
+        u_rest_d=u_rest_d, u_rest_q=u_rest_q, of_overmodulation=hexagon_state,
+        of_voltage_ripple=after.of_voltage_ripple, u_alpha=u_alpha, u_beta=u_beta,
+        rip_alpha=after.rip_alpha, rip_beta=after.rip_beta,
     )  # fmt: skip
     return following, Observed(
         i_a=i_a, i_b=i_b, i_c=i_c, current_at_rail=current_at_rail, u_dc=u_dc, u_max=u_max, u_dc_at_rail=u_dc_at_rail,

@@ -26,6 +26,7 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
+use work.fixed_pkg.all;
 use work.fluxproof_pkg.all;
 
 entity fluxproof is
@@ -121,7 +122,7 @@ architecture rtl of fluxproof is
   -- Of the over-modulation
   signal rip_alpha, rip_beta             : signed(PU_W - 1 downto 0);
   signal u_rip_d, u_rip_q                : signed(PU_W - 1 downto 0);
-  signal added_d, added_q                : signed(PU_W - 1 downto 0);
+  signal freed_d, freed_q                : signed(PU_W - 1 downto 0);  -- rotational voltage without the ripple
   signal inverse_used, inverse_beta_used : unsigned(U_DC_PROCESSING_INVERSE_W - 1 downto 0);
 
   -- From the estimators to the control
@@ -275,8 +276,8 @@ begin
 
     beginnings : entity work.mode_references
       port map (clk => clk, rst => rst, in_valid => dq_voltage_valid,
-                u_d => o.u_d, u_q => o.u_q, u_dec_d => o.u_dec_d, u_dec_q => o.u_dec_q, u_comp_d => added_d,
-                u_comp_q => added_q, i_d => o.i_d, i_q_made => i_q_made, i_d_source => i_d_source,
+                u_d => o.u_d, u_q => o.u_q, u_dec_d => o.u_dec_d, u_dec_q => o.u_dec_q, u_comp_d => e.u_comp_d,
+                u_comp_q => e.u_comp_q, i_d => o.i_d, i_q_made => i_q_made, i_d_source => i_d_source,
                 i_q_ext => i_q_ext, torque_ref => torque_ref, omega_me => o.omega_me, omega_ref => omega_ref,
                 by_voltage => by_voltage, by_speed => by_speed, regulates => regulates, run => run,
                 u_d_ext => settings.u_d_ext, u_q_ext => settings.u_q_ext, u_step => settings.u_step,
@@ -294,8 +295,8 @@ begin
 
     asked_d  <= u_d_now when by_voltage = '1' else u_pi_d;
     asked_q  <= u_q_now when by_voltage = '1' else u_pi_q;
-    turned_d <= o.u_dec_d and not by_voltage;
-    turned_q <= o.u_dec_q and not by_voltage;
+    turned_d <= freed_d and not by_voltage;
+    turned_q <= freed_q and not by_voltage;
   else generate
     by_voltage     <= '0';
     take_over      <= '0';
@@ -308,8 +309,8 @@ begin
     u_rest_q       <= (others => '0');
     asked_d        <= u_pi_d;
     asked_q        <= u_pi_q;
-    turned_d       <= o.u_dec_d;
-    turned_q       <= o.u_dec_q;
+    turned_d       <= freed_d;
+    turned_q       <= freed_q;
   end generate by_mode;
 
   speed_regulator : entity work.speed_pi
@@ -426,25 +427,25 @@ begin
 
     hexagon : entity work.overmodulation
       port map (clk => clk, rst => rst, in_valid => decoupling_valid,
-                u_pi_d => asked_d, u_pi_q => asked_q, u_dec_d => turned_d, u_dec_q => turned_q, u_comp_d => added_d,
-                u_comp_q => added_q, u_max => o.u_max, inverse => inverse, inverse_beta => inverse_beta,
+                u_d => o.u_d, u_pi_q => asked_q, u_dec_q => turned_q, u_comp_q => e.u_comp_q, u_max => o.u_max,
+                inverse => inverse, inverse_beta => inverse_beta,
                 out_valid => open, inverse_used => inverse_used, inverse_beta_used => inverse_beta_used);
 
-    added_d <= e.u_comp_d + u_rip_d;
-    added_q <= e.u_comp_q + u_rip_q;
+    freed_d <= saturate(resize(o.u_dec_d, PU_W + 1) + u_rip_d, PU_W);
+    freed_q <= saturate(resize(o.u_dec_q, PU_W + 1) + u_rip_q, PU_W);
   else generate
     u_rip_d           <= (others => '0');
     u_rip_q           <= (others => '0');
-    added_d           <= e.u_comp_d;
-    added_q           <= e.u_comp_q;
+    freed_d           <= o.u_dec_d;
+    freed_q           <= o.u_dec_q;
     inverse_used      <= inverse;
     inverse_beta_used <= inverse_beta;
   end generate by_hexagon;
 
   circle : entity work.voltage_limit
     port map (clk => clk, rst => rst, in_valid => decoupling_valid,
-              u_pi_d => asked_d, u_pi_q => asked_q, u_dec_d => turned_d, u_dec_q => turned_q, u_comp_d => added_d,
-              u_comp_q => added_q, u_max => o.u_max, lambda_d => o.lambda_d,
+              u_pi_d => asked_d, u_pi_q => asked_q, u_dec_d => turned_d, u_dec_q => turned_q, u_comp_d => e.u_comp_d,
+              u_comp_q => e.u_comp_q, u_max => o.u_max, lambda_d => o.lambda_d,
               out_soon => dq_voltage_soon, out_valid => dq_voltage_valid, u_d => o.u_d, u_q => o.u_q, sat_d => o.sat_d,
               sat_q => o.sat_q);
 

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Gain that makes the fundamental of a clamped modulation the voltage that was asked for, up to six-step.
 
-    m_square  = min(sum_d**2 + sum_q**2, u_max**2) / u_dc**2     sum = u_pi + u_dec + u_comp;  1/u_dc of the last sample
-    gain      = R(m)/m of the table, 1 within the circle         F(R) = m: docs/overmodulation.md
+    m_square  = min(u_d**2 + sum_q**2, u_max**2) / u_dc**2     sum_q = u_pi_q + u_dec_q + u_comp_q;  last sample's u_dc
+    gain      = R(m)/m of the table, 1 within the circle       F(R) = m: docs/overmodulation.md
     inverse_used = gain*inverse,  inverse_beta_used = gain*inverse_beta
 
 svm limits each duty to 0..1, which takes a voltage beyond the hexagon to its nearest point.  Over a turn the
 fundamental of a vector of length R, the circle u_dc/sqrt(3) being 1, is then F(R) < R, at most 6/(pi*sqrt(3)) = 1.1027.
 With R in its place the mean voltage over a sixth of a turn is the one that regulators and estimators know.
-The size is that of the voltage before the d axis is limited; what that limit cuts off is cut off in the vector too.
+The limit of u_q takes a root, its square does not: this is |u_dq|**2 of voltage_limit, eight clocks earlier.
 
-Formats: sums saturated to PU; square exact, floored to U(0,17); 1/u_dc**2 U(4,14), floored, of 1/u_dc below 4; product
-exact; table U(3,13) over m_square in steps of 2**-11; products with the inverse rounded half up and saturated.
+Formats: the sum saturated to PU; square exact, floored to U(0,17); 1/u_dc**2 U(4,14), floored, of 1/u_dc below 4;
+product exact; table U(3,13) over m_square in steps of 2**-11; products with the inverse rounded half up, saturated.
 """
 
 import math
@@ -79,10 +79,9 @@ class State(NamedTuple):
 
 
 @kernel
-def step(state, u_pi_d, u_pi_q, u_dec_d, u_dec_q, u_comp_d, u_comp_q, u_max, inverse, inverse_beta):
-    sum_d = saturate(u_pi_d + u_dec_d + u_comp_d, PU_W)
+def step(state, u_d, u_pi_q, u_dec_q, u_comp_q, u_max, inverse, inverse_beta):
     sum_q = saturate(u_pi_q + u_dec_q + u_comp_q, PU_W)
-    asked = min(sum_d * sum_d + sum_q * sum_q, u_max * u_max) >> DROP_ASKED
+    asked = min(u_d * u_d + sum_q * sum_q, u_max * u_max) >> DROP_ASKED
     beyond = asked * state.inverse_square - CIRCLE
     index = 0 if beyond < 0 else clamp((beyond >> DROP_STEP) + 1, 1, STEPS)
     gain = GAINS[index]
@@ -94,8 +93,8 @@ def step(state, u_pi_d, u_pi_q, u_dec_d, u_dec_q, u_comp_d, u_comp_q, u_max, inv
 
 def asked_square(v, state):
     """Square of the voltage over that of the bus as the state knows it."""
-    size = sum(PU.limit(sum(v[f"u_{part}_{x}"] for part in ("pi", "dec", "comp"))) ** 2 for x in "dq")
-    return min(size, v["u_max"] ** 2) * state.inverse_square * INVERSE_SQUARE.lsb
+    sum_q = PU.limit(v["u_pi_q"] + v["u_dec_q"] + v["u_comp_q"])
+    return min(v["u_d"] ** 2 + sum_q**2, v["u_max"] ** 2) * state.inverse_square * INVERSE_SQUARE.lsb
 
 
 def reference(v, state):
@@ -113,17 +112,24 @@ def bound(v, state):
 
 def stimuli(rng, _config):
     """Within the circle, over each step of the table to the LSB and beyond its end, at several bus voltages."""
-    rest = dict.fromkeys(("u_dec_d", "u_dec_q", "u_comp_d", "u_comp_q"), 0)
+    rest = dict.fromkeys(("u_dec_q", "u_comp_q"), 0)
     rows = []
-    for u_dc in (0.24, 0.3, 1.0, 1.37, 1.99):
+    for u_dc in (0.24, 0.3, 1.0, 1.37, 1.55):
         inverse = min(round(131072 / u_dc), INVERSE.hi)
-        bus = {"inverse": inverse, "inverse_beta": inverse * 7 // 8, "u_max": min(round(65536 * 0.63605 * u_dc), U_MAX.hi)}
+        bus = {
+            "inverse": inverse,
+            "inverse_beta": inverse * 7 // 8,
+            "u_max": min(round(65536 * 0.63605 * u_dc), U_MAX.hi),
+        }
         for part in (0.0, 0.5, 0.999, 1.0, 1.001, *np_range(1.0, 1.12, 60)):
             size, angle = 65536 * part * u_dc / math.sqrt(3.0), rng.uniform(0.0, 2.0 * math.pi)
             d, q = round(size * math.cos(angle)), round(size * math.sin(angle))
-            rows += [{**rest, **bus, "u_pi_d": d + e, "u_pi_q": q, "u_dec_q": e, "u_comp_d": -e} for e in (0, 1)]
-    ends = {"u_pi_d": PU.hi, "u_pi_q": PU.lo, "u_dec_d": PU.hi, "u_dec_q": PU.lo, "u_comp_d": 1, "u_comp_q": -1}
-    rows += [{**ends, "u_max": u, "inverse": i, "inverse_beta": i} for u in (0, 1, U_MAX.hi) for i in (1, 131072, INVERSE.hi)]
+            d = min(max(d, -U_MAX.hi), U_MAX.hi - 1)
+            rows += [{**rest, **bus, "u_d": d + e, "u_pi_q": q, "u_dec_q": e, "u_comp_q": -e} for e in (0, 1)]
+    ends = {"u_d": -U_MAX.hi, "u_pi_q": PU.lo, "u_dec_q": PU.lo, "u_comp_q": -1}
+    rows += [
+        {**ends, "u_max": u, "inverse": i, "inverse_beta": i} for u in (0, 1, U_MAX.hi) for i in (1, 131072, INVERSE.hi)
+    ]
     return rows
 
 
@@ -138,11 +144,16 @@ BLOCK = Block(
     paper="none: docs/overmodulation.md",
     step=step,
     inputs=(
-        Port("u_pi_d", PU, doc="output of the current regulator, d axis"),
+        Port(
+            "u_d",
+            PU,
+            lo=-U_MAX.hi,
+            hi=U_MAX.hi,
+            late=2,
+            doc="voltage, d axis, early in voltage_limit",
+        ),
         Port("u_pi_q", PU, late=1, doc="output of the current regulator, q axis"),
-        Port("u_dec_d", PU, doc="rotational voltage, d axis"),
         Port("u_dec_q", PU, late=1, doc="rotational voltage, q axis"),
-        Port("u_comp_d", PU, doc="compensation voltage, d axis"),
         Port("u_comp_q", PU, late=1, doc="compensation voltage, q axis"),
         Port("u_max", U_MAX, doc="radius of the voltage circle"),
         Port("inverse", INVERSE, late=LATE, doc="1/u_dc"),

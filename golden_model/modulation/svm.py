@@ -90,11 +90,9 @@ def stimuli(rng, _config):
                 for da in (-1, 0, 1)
                 if abs(round(a) + da) <= PU.hi
             ]
-    rows += [
-        {"u_alpha": round(60000 * math.cos(k)), "u_beta": round(60000 * math.sin(k)), "inverse": i, "inverse_beta": i * 7 // 8}
-        for k in range(12)
-        for i in (300000, 600000, 1000000)
-    ]
+    for inverse in (300000, 600000, 1000000):  # far beyond the hexagon
+        bus = {"inverse": inverse, "inverse_beta": inverse * 7 // 8}
+        rows += [{"u_alpha": round(6e4 * math.cos(k)), "u_beta": round(6e4 * math.sin(k)), **bus} for k in range(12)]
     # The border of over-modulation to the LSB, at any angle.
     for _ in range(60):
         angle, low, high = rng.uniform(0, 2 * math.pi), 0, 60000

@@ -71,7 +71,7 @@ def _check(run: Run, start, stop):
     signals = checkable(run.names)
     if run.config.overmodulation:  # the gain of the modulator depends on the voltages before their limit
         signals = {name: later for name, later in signals.items() if name not in AFTER_GAIN}
-    wanted = np.array([signals.get(name, None) is not None for name in FIELDS])
+    wanted = np.array([signals.get(name) is not None for name in FIELDS])
     later = np.array([signals.get(name, False) for name in FIELDS])
     full = np.zeros((stop - start, len(FIELDS)), np.int64)
     for n, name in enumerate(FIELDS):
