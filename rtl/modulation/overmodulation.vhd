@@ -54,6 +54,7 @@ architecture rtl of overmodulation is
   signal product        : signed(TWICE_W - 1 downto 0);
   signal square         : unsigned(TWICE_W - 1 downto 0);
   signal asked_7        : unsigned(ASKED_W - 1 downto 0);
+  signal excess_7       : signed(SCALED_W - 1 downto 0);
   signal beyond_8       : signed(SCALED_W - 1 downto 0);
   signal step_8         : signed(SCALED_W - OVERMODULATION_DROP_STEP - 1 downto 0);
   signal index_9        : natural range 0 to OVERMODULATION_STEPS;
@@ -73,6 +74,7 @@ begin
   valid(0) <= in_valid;
 
   short_11 <= saturate_u(signed('0' & inverse(INVERSE_W - 1 downto OVERMODULATION_DROP_INVERSE)), OVERMODULATION_SHORT_W);
+  excess_7 <= signed('0' & (asked_7 * state.inverse_square)) - OVERMODULATION_CIRCLE;
   step_8   <= beyond_8(SCALED_W - 1 downto OVERMODULATION_DROP_STEP);
 
   process (clk)
@@ -109,7 +111,7 @@ begin
       end if;
 
       -- Stage 8: beyond = asked/u_dc**2 - 1/3
-      beyond_8 <= signed('0' & (asked_7 * state.inverse_square)) - OVERMODULATION_CIRCLE;
+      beyond_8 <= excess_7;
 
       -- Stage 9: index of the table, 0 within the circle;  stage 10: gain
       if step_8 < 0 then
