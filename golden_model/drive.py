@@ -98,6 +98,9 @@ class Control:
     mode_change_s: float = positive("s", "shortest time from zero to a limit where a mode begins", 0.02)
     torque_bandwidth_hz: float = not_negative("Hz", "correction of the torque by the estimated flux", 2.0)
     voltage_reserve: float = not_negative("1", "part of the voltage circle left unused", 0.0, most=0.99)
+    voltage_fundamental: float | None = positive(
+        "1", "largest fundamental, of the circle; 1.1 with [core] overmodulation, else 1", None, most=1.1015
+    )
     current_kp_d_v_per_a: float | None = not_negative("V/A", "override", None)
     current_kp_q_v_per_a: float | None = not_negative("V/A", "override", None)
     current_ki_d_v_per_as: float | None = not_negative("V/(A s)", "override", None)
@@ -216,6 +219,7 @@ class Core:
     position_loop: bool = flag("true: a position loop over the speed loop, docs/position.md", False)
     residual: bool = flag("true: the motor beside its description, docs/faults.md; needs the estimators", False)
     modes: bool = flag("true: voltage mode and changes of mode without a step, docs/modes.md", False)
+    overmodulation: bool = flag("true: fundamentals of the voltage up to six-step, docs/overmodulation.md", False)
     ring_rows: int = whole(0, 2730, "telemetry rows of the ring in block RAM, 42 in a RAMB36; 0: none", 0)
     gate_active: int = whole(0, 1, "level of the gate pins at which a switch is on", 1)
     trip_active: int = whole(0, 1, "level of the pin trip that turns the gates off", 1)
@@ -313,6 +317,12 @@ class Drive:
     def current_sensors(self):
         """2 where [sensors] or [converters] say so: the third current is computed then."""
         return min(self.sensors.current_sensors, self.converters.currents)
+
+    @property
+    def fundamental(self):
+        """Largest fundamental of the voltage, of the circle u_dc/sqrt(3): above 1 with over-modulation."""
+        given = self.control.voltage_fundamental
+        return (1.1 if self.core.overmodulation else 1.0) if given is None else given
 
     @property
     def nominal_flux_wb(self):

@@ -128,6 +128,20 @@ def _low_side(drive):
         _refuse("[control] voltage_reserve", drive.control.voltage_reserve, f"at least {least:.4g} for {keys}: {why}")
 
 
+def _overmodulation(drive):
+    """Beyond the circle only with the blocks for it, and where currents are not measured in the lower legs."""
+    if drive.fundamental <= 1.0:
+        return
+    if not drive.core.overmodulation:
+        why = "at most 1 without [core] overmodulation"
+        _refuse("[control] voltage_fundamental", drive.fundamental, why)
+    if not drive.core.estimators:
+        _refuse("[core] estimators", False, "true with overmodulation: the ripple is known from the applied voltage")
+    if drive.sensors.low_side_settle_s is not None:
+        why = "at most 1 with [sensors] low_side_settle_s: beyond it a leg's lower switch is off for whole periods"
+        _refuse("[control] voltage_fundamental", drive.fundamental, why)
+
+
 def _position_pairs(drive):
     """The code of a resolver with several pole pairs repeats within a turn; it must tell the electrical angle."""
     given, pairs, kind = drive.sensors.position_pole_pairs, drive.machine.pole_pairs, drive.encoder.kind
@@ -370,7 +384,7 @@ def _regeneration(drive):
 
 
 RULES = (
-    _sample_time, _sampling, _carrier, _pulses, _low_side, _position_pairs, _samples_per_turn, _voltage, _current,
-    _flux, _codes, _trip_filter, _speed_loop, _current_loop, _flux_loop, _adaline_steps, _protection, _bootstrap,
-    _regeneration, _residual, check_encoder, check_converters, check_position,
+    _sample_time, _sampling, _carrier, _pulses, _low_side, _overmodulation, _position_pairs, _samples_per_turn,
+    _voltage, _current, _flux, _codes, _trip_filter, _speed_loop, _current_loop, _flux_loop, _adaline_steps,
+    _protection, _bootstrap, _regeneration, _residual, check_encoder, check_converters, check_position,
 )  # fmt: skip

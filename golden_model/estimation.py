@@ -21,6 +21,7 @@ from golden_model.estimators import (
     speed_reciprocal,
     torque,
     v_dead_adaline,
+    voltage_ripple,
     winding_resistance,
 )
 from golden_model.kernel import kernel
@@ -52,6 +53,9 @@ class State(NamedTuple):
     s_alpha: int = 0
     s_beta: int = 0
     of_motor_residual: motor_residual.State = motor_residual.State()
+    of_voltage_ripple: voltage_ripple.State = voltage_ripple.State()
+    rip_alpha: int = 0
+    rip_beta: int = 0
 
 
 class ForControl(NamedTuple):
@@ -152,7 +156,8 @@ def kept(state):
         of_clean_voltage=s.of_clean_voltage, lambda_m_alpha=s.lambda_m_alpha, lambda_m_beta=s.lambda_m_beta,
         merge_known=s.merge_known, lambda_pi_d=s.lambda_pi_d, lambda_pi_q=s.lambda_pi_q, lambda_add_d=s.lambda_add_d,
         lambda_add_q=s.lambda_add_q, v_comp=s.v_comp, v_leg=s.v_leg, s_alpha=s.s_alpha, s_beta=s.s_beta,
-        of_motor_residual=s.of_motor_residual,
+        of_motor_residual=s.of_motor_residual, of_voltage_ripple=s.of_voltage_ripple, rip_alpha=s.rip_alpha,
+        rip_beta=s.rip_beta,
     )  # fmt: skip
 
 
@@ -248,6 +253,16 @@ def step(state, given, seen, sample, regs, config):
             r,
         )  # fmt: skip
     mean_d, mean_q, sixth_d, sixth_q = residual[2:6]
+    ripple_state, rip_alpha, rip_beta = state.of_voltage_ripple, state.rip_alpha, state.rip_beta
+    if config.overmodulation:
+        ripple_state, (rip_alpha, rip_beta) = voltage_ripple.step(
+            state.of_voltage_ripple,
+            voltage_ripple.Inputs(
+                u_applied_alpha=u_applied_alpha, u_applied_beta=u_applied_beta, voltage_known=voltage_known,
+                u_alpha=state.u_alpha, u_beta=state.u_beta, cos_theta=v.cos_theta, sin_theta=v.sin_theta, run=x.run,
+            ),
+            r,
+        )  # fmt: skip
 
     following = State(
         of_flux_merge=merge_state, of_delta_lambda=delta_state, of_flux_compensation=compensation_state,
@@ -255,7 +270,7 @@ def step(state, given, seen, sample, regs, config):
         of_clean_voltage=clean_state, lambda_m_alpha=lambda_m_alpha, lambda_m_beta=lambda_m_beta,
         merge_known=merge_known, lambda_pi_d=lambda_pi_d, lambda_pi_q=lambda_pi_q, lambda_add_d=lambda_add_d,
         lambda_add_q=lambda_add_q, v_comp=v_comp, v_leg=v_leg, s_alpha=s_alpha, s_beta=s_beta,
-        of_motor_residual=residual_state,
+        of_motor_residual=residual_state, of_voltage_ripple=ripple_state, rip_alpha=rip_alpha, rip_beta=rip_beta,
     )  # fmt: skip
     return following, Estimated(
         u_comp_d=g.u_comp_d, u_comp_q=g.u_comp_q, u_applied_alpha=u_applied_alpha, u_applied_beta=u_applied_beta,

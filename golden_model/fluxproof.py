@@ -24,6 +24,7 @@ from golden_model.control import (
     position_trajectory,
     reference_table,
     regeneration_limit,
+    ripple_voltage,
     speed_pi,
     torque_correction,
     torque_ramp,
@@ -48,11 +49,12 @@ from golden_model.estimators import (
     speed_reciprocal,
     torque,
     v_dead_adaline,
+    voltage_ripple,
     winding_resistance,
 )
 from golden_model.estimators.flux_models import CURRENT_MODEL
-from golden_model.fixed import Format
-from golden_model.formats import PU
+from golden_model.fixed import Format, saturate
+from golden_model.formats import PU, PU_W
 from golden_model.io import (
     brake_chopper,
     current_conditioning,
@@ -71,7 +73,14 @@ from golden_model.io import (
     u_dc_processing,
 )
 from golden_model.kernel import kernel
-from golden_model.modulation import bootstrap_charge, gate_generation, pwm_compare, svm, svm_delay_compensation
+from golden_model.modulation import (
+    bootstrap_charge,
+    gate_generation,
+    overmodulation,
+    pwm_compare,
+    svm,
+    svm_delay_compensation,
+)
 from golden_model.transforms import clarke, flux_inverse_park, flux_park, inverse_park, park, sincos
 
 # Instance of the top -> (its block, the instances it waits for).  A block starts when the last of them is done.
@@ -106,13 +115,22 @@ WIRING = {
     "leg_compensation": (dead_time_compensation, ("latch",)),
     "compensation_dq": (park, ("leg_compensation", "trig")),
     "direction_functions": (park, ("trig",)),
-    "circle": (voltage_limit, ("current_regulators", "cross_coupling", "compensation_dq", "bus_voltage")),
+    "ripple_answer": (ripple_voltage, ("trig", "speed_measurement")),
+    "circle": (
+        voltage_limit,
+        ("current_regulators", "cross_coupling", "compensation_dq", "bus_voltage", "ripple_answer"),
+    ),
+    "hexagon": (
+        overmodulation,
+        ("current_regulators", "cross_coupling", "compensation_dq", "bus_voltage", "ripple_answer", "bus_reciprocal"),
+    ),
     "beginnings": (mode_references, ("circle",)),
     "stator_voltage": (inverse_park, ("circle", "trig")),
-    "modulator": (svm, ("stator_voltage", "bus_reciprocal")),
+    "modulator": (svm, ("stator_voltage", "bus_reciprocal", "hexagon")),
     "compare": (pwm_compare, ("modulator",)),
     "period_voltage": (applied_voltage, ("bus_voltage",)),
     "motor_voltage": (clean_voltage, ("period_voltage",)),
+    "ripple": (voltage_ripple, ("period_voltage", "trig")),
     "magnetic_model": (current_model, ("models",)),
     "model_flux": (flux_inverse_park, ("magnetic_model",)),
     "merge": (flux_merge, ("model_flux", "motor_voltage")),
@@ -153,8 +171,12 @@ EARLY = {
     ("current_regulators", "regeneration"): 1,
     ("models", "rotor_frame"): 1,
     ("models", "merged_flux"): 2,
+    ("ripple_answer", "trig"): sincos.SECOND,
     ("circle", "current_regulators"): 1,
     ("circle", "compensation_dq"): 1,
+    ("hexagon", "current_regulators"): 1,
+    ("hexagon", "compensation_dq"): 1,
+    ("hexagon", "bus_reciprocal"): overmodulation.LATE,
     ("stator_voltage", "circle"): 1,
 }
 
@@ -202,11 +224,12 @@ PARTS = {
     "position_loop": ("position_regulator", "trajectory", "towards"),
     "modes": ("modes", "beginnings"),
     "residual": ("residual",),
+    "overmodulation": ("ripple_answer", "hexagon", "ripple"),
 }
 PARTS["estimators"] = (
     *("resistance", "merged_flux", "leg_compensation", "compensation_dq", "direction_functions", "period_voltage"),
     *("motor_voltage", "towards", "directions", "magnetic_model", "model_flux", "merge", "speed_inverse", "flux_error"),
-    *("compensation", "torque_estimate", "monitor", "inverter_loss", "magnet_flux", "residual"),
+    *("compensation", "torque_estimate", "monitor", "inverter_loss", "magnet_flux", "residual", "ripple"),
 )
 
 
@@ -232,6 +255,7 @@ class Config(NamedTuple):
     position_loop: int = 0  # 1: a position loop over the speed loop, and its trajectory
     residual: int = 0  # 1: the residual of the motor beside its description, with the estimators
     modes: int = 0  # 1: voltage mode, and changes of mode without a step of the voltage
+    overmodulation: int = 0  # 1: fundamentals up to six-step
 
 
 class Sample(NamedTuple):
@@ -323,6 +347,13 @@ class State(NamedTuple):
     of_mode_references: mode_references.State = mode_references.State()
     u_rest_d: int = 0
     u_rest_q: int = 0
+    # The over-modulation's part, likewise
+    of_overmodulation: overmodulation.State = overmodulation.State()
+    of_voltage_ripple: voltage_ripple.State = voltage_ripple.State()
+    u_alpha: int = 0
+    u_beta: int = 0
+    rip_alpha: int = 0
+    rip_beta: int = 0
 
 
 class Observed(NamedTuple):
@@ -538,6 +569,11 @@ def step_table(state, sample, regs, config, of_speed, table):
     (omega_chord,) = chord_speed.step(omega_me, r.k_chord)
     u_dec_d, u_dec_q = decoupling.step(omega_chord, lambda_d, lambda_q)
     asked_d, asked_q, turned_d, turned_q = u_pi_d, u_pi_q, u_dec_d, u_dec_q
+    if c.overmodulation:
+        u_rip_d, u_rip_q = ripple_voltage.step(
+            state.rip_alpha, state.rip_beta, cos_theta, sin_theta, omega_me, r.k_ripple
+        )
+        turned_d, turned_q = saturate(u_dec_d + u_rip_d, PU_W), saturate(u_dec_q + u_rip_q, PU_W)
     if by_voltage:
         asked_d, asked_q, turned_d, turned_q = begun.u_d_now, begun.u_q_now, 0, 0
     voltage_limit_state, (u_d, u_q, sat_d, sat_q) = voltage_limit.step(
@@ -545,7 +581,12 @@ def step_table(state, sample, regs, config, of_speed, table):
     )
 
     u_alpha, u_beta = inverse_park.step(u_d, u_q, cos_out, sin_out)
-    duty_a, duty_b, duty_c = svm.step(u_alpha, u_beta, inverse, inverse_beta)
+    hexagon_state, inverse_used, inverse_beta_used = state.of_overmodulation, inverse, inverse_beta
+    if c.overmodulation:
+        hexagon_state, (inverse_used, inverse_beta_used) = overmodulation.step(
+            state.of_overmodulation, u_d, asked_q, turned_q, given.u_comp_q, u_max, inverse, inverse_beta
+        )
+    duty_a, duty_b, duty_c = svm.step(u_alpha, u_beta, inverse_used, inverse_beta_used)
     compare_a, compare_b, compare_c = pwm_compare.step(
         duty_a, duty_b, duty_c, r.min_pulse, r.double_update, c.carrier_half
     )
@@ -661,7 +702,9 @@ def step_table(state, sample, regs, config, of_speed, table):
         of_position_control=position_state, of_position_trajectory=trajectory_state, position_ref=position_ref,
         omega_ff=omega_ff, torque_ff=torque_ff, at_rest=at_rest,
         of_motor_residual=after.of_motor_residual, of_mode_change=modes_state, of_mode_references=references_state,
-        u_rest_d=u_rest_d, u_rest_q=u_rest_q,
+        u_rest_d=u_rest_d, u_rest_q=u_rest_q, of_overmodulation=hexagon_state,
+        of_voltage_ripple=after.of_voltage_ripple, u_alpha=u_alpha, u_beta=u_beta,
+        rip_alpha=after.rip_alpha, rip_beta=after.rip_beta,
     )  # fmt: skip
     return following, Observed(
         i_a=i_a, i_b=i_b, i_c=i_c, current_at_rail=current_at_rail, u_dc=u_dc, u_max=u_max, u_dc_at_rail=u_dc_at_rail,

@@ -59,8 +59,8 @@ def sensing(drive):
     yield Entry("u_dc_offset", s.u_dc_offset_code, "code", mid, "[sensors] adc_bits, u_dc_offset_code")
     keys = f"[sensors] u_dc_range_v, u_dc_gain; {base_keys(drive, 'voltage_v')}"
     yield Entry("u_dc_gain", s.u_dc_gain * s.u_dc_range_v / 2.0, "V", b.voltage_v, keys)
-    k_u_max = (1.0 - drive.control.voltage_reserve) / math.sqrt(3.0)
-    yield Entry("k_u_max", k_u_max, "1", 1.0, "[control] voltage_reserve")
+    k_u_max = drive.fundamental * (1.0 - drive.control.voltage_reserve) / math.sqrt(3.0)
+    yield Entry("k_u_max", k_u_max, "1", 1.0, "[control] voltage_reserve, voltage_fundamental")
     keys = "[machine] pole_pairs; [sensors] position_pole_pairs"
     yield Entry("pole_pairs", drive.code_pairs, "1", 1.0, keys)
     yield Entry("reverse", int(s.position_reverse), "1", 1.0, "[sensors] position_reverse")
@@ -130,6 +130,9 @@ def current_loop(drive):
         yield Entry(f"ki_{axis}", ki, "V/(A s)", ohm / t_s, f"{ki_key}; {base}")
         keys = f"[machine] inductance_{axis}_h; {base}; {base_keys(drive, 'omega_me_rad_s')}"
         yield Entry(f"l_{axis}", henry, "H", b.flux_wb / b.current_a, keys)
+    w_c = min(current_gains(drive, axis)[0] / getattr(m, f"inductance_{axis}_h") for axis in "dq")
+    keys = f"[control] current_bandwidth_hz, current_kp_d_v_per_a; {base_keys(drive, 'omega_me_rad_s')}"
+    yield Entry("k_ripple", min(w_c, 1.9 * b.omega_me_rad_s), "rad/s", b.omega_me_rad_s, keys)
     keys = f"[machine] magnet_flux_wb; {base_keys(drive, 'voltage_v', 'omega_me_rad_s')}"
     yield Entry("lambda_mg", m.magnet_flux_wb, "Wb", b.flux_wb, keys)
     keys = "[control] delay_samples; [sampling] delay_s; [inverter] pwm_frequency_hz"

@@ -13,6 +13,7 @@
 -- POSITION_LOOP = 1 builds a position loop over the speed loop and the trajectory that it follows, used with
 -- position_mode, see control/position_trajectory.vhd.
 -- MODES = 1 builds voltage mode and changes of mode without a step of the voltage, see control/mode_references.vhd.
+-- OVERMODULATION = 1 lets the fundamental of the voltage go up to six-step, see modulation/overmodulation.vhd.
 -- RESIDUAL = 1 compares the motor with its description, see estimators/motor_residual.vhd.
 -- Formats: per unit, see golden_model/formats.py; settings as `fluxproof registers drive.toml` prints them.
 -- Latency: sample_valid to duty_valid FLUXPROOF_SAMPLE_TO_DUTY clocks; samples FLUXPROOF_SAMPLE_INTERVAL or more apart.
@@ -25,6 +26,7 @@
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
+use work.fixed_pkg.all;
 use work.fluxproof_pkg.all;
 
 entity fluxproof is
@@ -36,7 +38,8 @@ entity fluxproof is
     REFERENCES    : natural range 0 to 1      := 0;  -- 1: current references by a table of torque and flux limit
     POSITION_LOOP : natural range 0 to 1      := 0;  -- 1: a position loop over the speed loop, and its trajectory
     RESIDUAL      : natural range 0 to 1      := 0;  -- 1: the residual of the motor, with the estimators
-    MODES         : natural range 0 to 1      := 0  -- 1: voltage mode, changes of mode without a step of the voltage
+    MODES         : natural range 0 to 1      := 0;  -- 1: voltage mode, changes of mode without a step of the voltage
+    OVERMODULATION : natural range 0 to 1     := 0  -- 1: fundamentals up to six-step
   );
   port (
     clk             : in  std_logic;
@@ -115,6 +118,12 @@ architecture rtl of fluxproof is
   signal i_d_source                           : signed(PU_W - 1 downto 0);
   signal u_rest_d, u_rest_q                   : signed(PU_W - 1 downto 0);
   signal asked_d, asked_q, turned_d, turned_q : signed(PU_W - 1 downto 0);
+
+  -- Of the over-modulation
+  signal rip_alpha, rip_beta             : signed(PU_W - 1 downto 0);
+  signal u_rip_d, u_rip_q                : signed(PU_W - 1 downto 0);
+  signal freed_d, freed_q                : signed(PU_W - 1 downto 0);  -- rotational voltage without the ripple
+  signal inverse_used, inverse_beta_used : unsigned(U_DC_PROCESSING_INVERSE_W - 1 downto 0);
 
   -- From the estimators to the control
   signal flux_mode              : unsigned(1 downto 0);
@@ -286,8 +295,8 @@ begin
 
     asked_d  <= u_d_now when by_voltage = '1' else u_pi_d;
     asked_q  <= u_q_now when by_voltage = '1' else u_pi_q;
-    turned_d <= o.u_dec_d and not by_voltage;
-    turned_q <= o.u_dec_q and not by_voltage;
+    turned_d <= freed_d and not by_voltage;
+    turned_q <= freed_q and not by_voltage;
   else generate
     by_voltage     <= '0';
     take_over      <= '0';
@@ -300,8 +309,8 @@ begin
     u_rest_q       <= (others => '0');
     asked_d        <= u_pi_d;
     asked_q        <= u_pi_q;
-    turned_d       <= o.u_dec_d;
-    turned_q       <= o.u_dec_q;
+    turned_d       <= freed_d;
+    turned_q       <= freed_q;
   end generate by_mode;
 
   speed_regulator : entity work.speed_pi
@@ -408,6 +417,31 @@ begin
               omega_chord => o.omega_chord, lambda_d => o.lambda_d, lambda_q => o.lambda_q,
               out_valid => decoupling_valid, u_dec_d => o.u_dec_d, u_dec_q => o.u_dec_q);
 
+  by_hexagon : if OVERMODULATION = 1 generate
+    ripple_answer : entity work.ripple_voltage
+      port map (clk => clk, rst => rst, in_valid => trig_soon,
+                rip_alpha => rip_alpha, rip_beta => rip_beta, cos_theta => cos_theta, sin_theta => sin_theta,
+                omega_me => o.omega_me,
+                k_ripple => settings.k_ripple,
+                out_valid => open, u_rip_d => u_rip_d, u_rip_q => u_rip_q);
+
+    hexagon : entity work.overmodulation
+      port map (clk => clk, rst => rst, in_valid => decoupling_valid,
+                u_d => o.u_d, u_pi_q => asked_q, u_dec_q => turned_q, u_comp_q => e.u_comp_q, u_max => o.u_max,
+                inverse => inverse, inverse_beta => inverse_beta,
+                out_valid => open, inverse_used => inverse_used, inverse_beta_used => inverse_beta_used);
+
+    freed_d <= saturate(resize(o.u_dec_d, PU_W + 1) + u_rip_d, PU_W);
+    freed_q <= saturate(resize(o.u_dec_q, PU_W + 1) + u_rip_q, PU_W);
+  else generate
+    u_rip_d           <= (others => '0');
+    u_rip_q           <= (others => '0');
+    freed_d           <= o.u_dec_d;
+    freed_q           <= o.u_dec_q;
+    inverse_used      <= inverse;
+    inverse_beta_used <= inverse_beta;
+  end generate by_hexagon;
+
   circle : entity work.voltage_limit
     port map (clk => clk, rst => rst, in_valid => decoupling_valid,
               u_pi_d => asked_d, u_pi_q => asked_q, u_dec_d => turned_d, u_dec_q => turned_q, u_comp_d => e.u_comp_d,
@@ -423,8 +457,9 @@ begin
               out_valid => ab_voltage_valid, u_alpha => o.u_alpha, u_beta => o.u_beta);
 
   modulator : entity work.svm
+    generic map (OVERMODULATION => OVERMODULATION)
     port map (clk => clk, rst => rst, in_valid => ab_voltage_valid,
-              u_alpha => o.u_alpha, u_beta => o.u_beta, inverse => inverse, inverse_beta => inverse_beta,
+              u_alpha => o.u_alpha, u_beta => o.u_beta, inverse => inverse_used, inverse_beta => inverse_beta_used,
               out_valid => duty_ready, duty_a => o.duty_a, duty_b => o.duty_b, duty_c => o.duty_c);
 
   compare : entity work.pwm_compare
@@ -504,6 +539,19 @@ begin
                 u_applied_alpha => e.u_applied_alpha, u_applied_beta => e.u_applied_beta, s_alpha => s_alpha,
                 s_beta => s_beta, v_leg => v_leg,
                 out_valid => open, u_clean_alpha => u_clean_alpha, u_clean_beta => u_clean_beta);
+
+    ripple_of_hexagon : if OVERMODULATION = 1 generate
+      ripple : entity work.voltage_ripple
+        port map (clk => clk, rst => rst, in_valid => period_valid,
+                  u_applied_alpha => e.u_applied_alpha, u_applied_beta => e.u_applied_beta,
+                  voltage_known => voltage_known, u_alpha => o.u_alpha, u_beta => o.u_beta, cos_theta => cos_theta,
+                  sin_theta => sin_theta, run => run,
+                  t_s => settings.t_s,
+                  out_valid => open, rip_alpha => rip_alpha, rip_beta => rip_beta);
+    else generate
+      rip_alpha <= (others => '0');
+      rip_beta  <= (others => '0');
+    end generate ripple_of_hexagon;
 
     by_direction : if POSITION_LOOP = 1 generate
       towards : entity work.direction_current
@@ -633,6 +681,8 @@ begin
     lambda_m_d   <= (others => '0');
     lambda_m_q   <= (others => '0');
     minus_rho    <= (others => '0');
+    rip_alpha    <= (others => '0');
+    rip_beta     <= (others => '0');
     values_valid <= compare_ready;
     e            <= NOTHING_ESTIMATED;
   end generate estimation;

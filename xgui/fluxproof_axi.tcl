@@ -13,6 +13,7 @@ proc init_gui {IPINST} {
   ipgui::add_param $IPINST -name "POSITION_LOOP" -parent ${page}
   ipgui::add_param $IPINST -name "RESIDUAL" -parent ${page}
   ipgui::add_param $IPINST -name "MODES" -parent ${page}
+  ipgui::add_param $IPINST -name "OVERMODULATION" -parent ${page}
   ipgui::add_param $IPINST -name "RING_ROWS" -parent ${page}
   ipgui::add_param $IPINST -name "GATE_ACTIVE" -parent ${page}
   ipgui::add_param $IPINST -name "TRIP_ACTIVE" -parent ${page}
@@ -117,6 +118,17 @@ proc validate_PARAM_VALUE.MODES {PARAM_VALUE.MODES} {
 
 proc update_MODELPARAM_VALUE.MODES {MODELPARAM_VALUE.MODES PARAM_VALUE.MODES} {
   set_property value [get_property value ${PARAM_VALUE.MODES}] ${MODELPARAM_VALUE.MODES}
+}
+
+proc update_PARAM_VALUE.OVERMODULATION {PARAM_VALUE.OVERMODULATION} {
+}
+
+proc validate_PARAM_VALUE.OVERMODULATION {PARAM_VALUE.OVERMODULATION} {
+  return true
+}
+
+proc update_MODELPARAM_VALUE.OVERMODULATION {MODELPARAM_VALUE.OVERMODULATION PARAM_VALUE.OVERMODULATION} {
+  set_property value [get_property value ${PARAM_VALUE.OVERMODULATION}] ${MODELPARAM_VALUE.OVERMODULATION}
 }
 
 proc update_PARAM_VALUE.RING_ROWS {PARAM_VALUE.RING_ROWS} {

@@ -217,6 +217,7 @@ def test_cells_are_those_that_were_counted():
         "references": ("speed_range", r"`\w+` (\d+) LUT, (\d) DSP48"),
         "residual": ("faults", r"The block takes ([\d,]+) LUT, .* (one) DSP48"),
         "modes": ("modes", r"`mode_\w+` (\d+) (LUT)"),
+        "overmodulation": ("overmodulation", r"`(?:overmodulation|\w*ripple\w*)` (\d+) LUT, \d+ FF, (\d) DSP48"),
         "ring_rows": ("telemetry", r"of 42 rows \| (\d+), \d+, (\d) "),
     }
     for key, (page, sentence) in told.items():

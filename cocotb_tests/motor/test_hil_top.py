@@ -99,7 +99,7 @@ def test_temperatures_and_filter_of_a_drive_file(tmp_path):
     assert warm["motor_k_filter"] * 2**-17 == pytest.approx(-math.expm1(-17 / 34e6 / 5e-6), rel=1e-4)
     with pytest.raises(DriveError, match=r"\[plant.hil\] needs winding_s, magnet_s as well"):
         words_of(tmp_path, *bodies[:2])
-    with pytest.raises(DriveError, match=r"temperature_magnet_c = 60 beside temperature_winding_c = 80"):
+    with pytest.raises(DriveError, match=r"temperature_magnet_c = 60 differs from temperature_winding_c = 80"):
         words_of(tmp_path, *hot[:2], "temperature_magnet_c = 60", *bodies)
 
 

@@ -68,6 +68,11 @@ extern "C" {
 #define FLUXPROOF__MODES__VALUE_bp 0
 #define FLUXPROOF__MODES__VALUE_bw 32
 
+// reg - fluxproof::overmodulation
+#define FLUXPROOF__OVERMODULATION__VALUE_bm 0xffffffff
+#define FLUXPROOF__OVERMODULATION__VALUE_bp 0
+#define FLUXPROOF__OVERMODULATION__VALUE_bw 32
+
 // reg - fluxproof::enable
 #define FLUXPROOF__ENABLE__VALUE_bm 0x1
 #define FLUXPROOF__ENABLE__VALUE_bp 0
@@ -1015,6 +1020,12 @@ extern "C" {
 #define FLUXPROOF__OMEGA_STEP__VALUE_bp 0
 #define FLUXPROOF__OMEGA_STEP__VALUE_bw 32
 #define FLUXPROOF__OMEGA_STEP__VALUE_reset 0x1
+
+// reg - fluxproof::k_ripple
+#define FLUXPROOF__K_RIPPLE__VALUE_bm 0xffffffff
+#define FLUXPROOF__K_RIPPLE__VALUE_bp 0
+#define FLUXPROOF__K_RIPPLE__VALUE_bw 32
+#define FLUXPROOF__K_RIPPLE__VALUE_reset 0x0
 
 // reg - fluxproof::shaft_position
 #define FLUXPROOF__SHAFT_POSITION__VALUE_bm 0xffffffff
@@ -2051,7 +2062,8 @@ typedef struct {
     uint32_t position_loop;
     uint32_t residual;
     uint32_t modes;
-    uint8_t RESERVED_2c_3f[0x14];
+    uint32_t overmodulation;
+    uint8_t RESERVED_30_3f[0x10];
     uint32_t enable;
     uint32_t clear_trip;
     uint32_t clear_faults;
@@ -2213,7 +2225,8 @@ typedef struct {
     uint32_t u_step;
     uint32_t i_step;
     uint32_t omega_step;
-    uint8_t RESERVED_2d4_2df[0xc];
+    uint32_t k_ripple;
+    uint8_t RESERVED_2d8_2df[0x8];
     uint32_t shaft_position;
     uint32_t position_error;
     uint8_t RESERVED_2e8_33f[0x58];

@@ -14,7 +14,10 @@ DRIVER = {
 }
 
 
-LEFT_OUT = ("position_regulator", "residual", "modes", "beginnings")  # instances that the default generics leave out
+LEFT_OUT = (
+    *("position_regulator", "residual", "modes", "beginnings"),
+    *("ripple_answer", "ripple", "hexagon"),
+)  # instances that the default generics leave out
 
 
 def instance(core, label: str):

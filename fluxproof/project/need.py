@@ -35,9 +35,9 @@ ENCODERS = {
 }  # fmt: skip
 CONVERTERS = {"codes": Cells(0, 0), "spi": Cells(442, 0), "xadc": Cells(156, 0), "delta_sigma": Cells(1133, 4)}
 BOARD = Cells(114 + 3 + 42 + 3 + 1510, 0)  # what else a board has, its registers for the core's
-OPTIONS = {  # keys of [core] that build a block in: position.md, speed_range.md, faults.md, telemetry.md, modes.md
+OPTIONS = {  # keys of [core] that build a block in, counted on the page of each
     "position_loop": Cells(707 + 269, 2), "references": Cells(1084, 6), "residual": Cells(2059, 1),
-    "ring_rows": Cells(97, 0), "modes": Cells(5 + 353, 0),
+    "ring_rows": Cells(97, 0), "modes": Cells(5 + 353, 0), "overmodulation": Cells(327 + 76 + 552, 11),
 }  # fmt: skip
 MOTOR = Cells(4461, 32)  # motor_bench without its registers: docs/hil.md
 

@@ -45,6 +45,7 @@ GENERICS = (
     "position_loop",
     "residual",
     "modes",
+    "overmodulation",
 )
 
 
@@ -130,12 +131,12 @@ _SETTINGS = """
     294 move_speed    298 move_step      29c jerk_bits      2a0 torque_lead    2a4 use_stops      2a8 stop_low
     2ac stop_high     2b0 k_inertia      2b4 k_viscous      2b8 coulomb
     2bc voltage_mode  2c0 u_d_ext         2c4 u_q_ext      2c8 u_step         2cc i_step
-    2d0 omega_step
+    2d0 omega_step    2d4 k_ripple
     340 residual_min  344 residual_w     348 residual_i     34c residual_samples
     350 residual_sum_max                 354 residual_sum_i
     378 residual_leg  37c residual_light
     380 residual_slow
-"""  # 24c, 278 to 27c, 2d4 to 2dc, 2e8 to 33c, 384 to 3bc and 3f0 to 3fc are free
+"""  # 24c, 278 to 27c, 2d8 to 2dc, 2e8 to 33c, 384 to 3bc and 3f0 to 3fc are free
 _COMMANDS = {
     "enable": (0x040, Kind.COMMAND),
     "clear_trip": (0x044, Kind.PULSE),
@@ -264,6 +265,7 @@ def _read_only() -> list[Register]:
         word("position_loop", 0x020, Kind.GENERIC, "1: with a position loop and its trajectory"),
         word("residual", 0x024, Kind.GENERIC, "1: with the residual of the motor beside its description"),
         word("modes", 0x028, Kind.GENERIC, "1: with voltage mode and changes of mode without a step of the voltage"),
+        word("overmodulation", 0x02C, Kind.GENERIC, "1: with fundamentals of the voltage up to six-step"),
         Register("flags", 0x080, Kind.STATUS, flags, "status flags of the core, read together"),
         Register("ring_state", 0x3E0, Kind.STATUS, ring_state, "what the ring of telemetry does, read together"),
         *(

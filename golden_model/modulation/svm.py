@@ -7,9 +7,10 @@
 
 a + b + c = 0, so the zero-sequence voltage -(max + min)/2 of the symmetrical pattern is half the middle
 leg.  Formats: products 33 fraction bits, rounded half up to S(1,17); legs and sum exact; duty rounded half up, then
-clamped to 0..1 (over-modulation).
+clamped to 0..1: a voltage beyond the hexagon becomes its nearest point.
 Range: the voltage is below two bus voltages, so x and y need no limiter.  voltage_limit allows less than one: k_u_max
-is below 1, and the circle's radius and the inverses come from the same sample's u_dc.
+is below 1, and the circle's radius and the inverses come from the same sample's u_dc.  With OVERMODULATION = 1 the
+inverses have a gain below 8 (modulation/overmodulation), x and y are S(3,17).
 """
 
 import math
@@ -29,7 +30,7 @@ DROP_DUTY = SUM_FRAC - DUTY.frac_bits
 
 
 @kernel
-def step(u_alpha, u_beta, inverse, inverse_beta):
+def step(u_alpha, u_beta, inverse, inverse_beta, _overmodulation=0):
     prod_x = u_alpha * inverse
     prod_y = u_beta * inverse_beta
     x = round_half_up(prod_x, DROP_SCALED)
@@ -65,11 +66,11 @@ def bound(_v, _state):
     return {f"duty_{k}": 1.5 * SCALED.lsb + DUTY.lsb / 2 for k in "abc"}
 
 
-def below_two(v, _config):
-    """``v`` with the voltage limited to less than two bus voltages."""
+def below_two(v, config):
+    """``v`` with the voltage limited to less than two bus voltages, to eight with over-modulation."""
     out = dict(v)
     for u, inverse in (("u_alpha", "inverse"), ("u_beta", "inverse_beta")):
-        most = ((SCALED.hi << DROP_SCALED) - 1) // max(v[inverse], 1)
+        most = (((SCALED.hi << 2 * config["OVERMODULATION"]) << DROP_SCALED) - 1) // max(v[inverse], 1)
         out[u] = min(max(v[u], -most), most)
     return out
 
@@ -89,6 +90,9 @@ def stimuli(rng, _config):
                 for da in (-1, 0, 1)
                 if abs(round(a) + da) <= PU.hi
             ]
+    for inverse in (300000, 600000, 1000000):  # far beyond the hexagon
+        bus = {"inverse": inverse, "inverse_beta": inverse * 7 // 8}
+        rows += [{"u_alpha": round(6e4 * math.cos(k)), "u_beta": round(6e4 * math.sin(k)), **bus} for k in range(12)]
     # The border of over-modulation to the LSB, at any angle.
     for _ in range(60):
         angle, low, high = rng.uniform(0, 2 * math.pi), 0, 60000
@@ -120,6 +124,7 @@ BLOCK = Block(
     outputs=tuple(Port(f"duty_{k}", DUTY, hi=DUTY_ONE, doc=f"duty, leg {k}") for k in "abc"),
     latency=5,
     constants={"DROP_SCALED": DROP_SCALED, "SCALED_W": SCALED_W, "HALF": HALF, "DROP_DUTY": DROP_DUTY},
+    configs=({"OVERMODULATION": 0}, {"OVERMODULATION": 1}),
     reference=reference,
     bound=bound,
     stimuli=stimuli,

@@ -21,20 +21,21 @@ use work.fluxproof_pkg.all;
 
 entity fluxproof_axi is
   generic (
-    CLOCK_HZ      : integer range 1 to 500000000 := 200000000;  -- rate of aclk; software reads it back
-    ADC_BITS      : integer range 12 to 16       := 16;  -- width of the ADC codes
-    POSITION_BITS : integer range 8 to 18        := 16;  -- width of the position code
-    CARRIER_HALF  : integer range 8 to 32767     := 10000;  -- half a PWM period in clocks
-    ESTIMATORS    : integer range 0 to 1         := 1;  -- 0 leaves the estimators out
-    REFERENCES    : integer range 0 to 1         := 0;  -- 1 builds the torque table
-    POSITION_LOOP : integer range 0 to 1         := 0;  -- 1 builds the position loop and its trajectory
-    RESIDUAL      : integer range 0 to 1         := 0;  -- 1 compares the motor with its description
-    MODES         : integer range 0 to 1         := 0;  -- 1 builds voltage mode and changes of mode without a step
-    RING_ROWS     : integer range 0 to 2730      := 0;  -- telemetry rows of the ring, 42 in a block RAM; 0 leaves it out
-    GATE_ACTIVE   : integer range 0 to 1         := 1;  -- level of gate_high and gate_low at which a switch is on
-    TRIP_ACTIVE   : integer range 0 to 1         := 1;  -- level of trip that turns the gates off
-    BRAKE_ACTIVE  : integer range 0 to 1         := 1;  -- level of brake at which the resistor is on
-    TRIP_FILTER   : integer range 0 to 1023      := 0  -- longest pulse of trip without effect, clocks; 0: every pulse acts
+    CLOCK_HZ       : integer range 1 to 500000000 := 200000000;  -- rate of aclk; software reads it back
+    ADC_BITS       : integer range 12 to 16       := 16;  -- width of the ADC codes
+    POSITION_BITS  : integer range 8 to 18        := 16;  -- width of the position code
+    CARRIER_HALF   : integer range 8 to 32767     := 10000;  -- half a PWM period in clocks
+    ESTIMATORS     : integer range 0 to 1         := 1;  -- 0 leaves the estimators out
+    REFERENCES     : integer range 0 to 1         := 0;  -- 1 builds the torque table
+    POSITION_LOOP  : integer range 0 to 1         := 0;  -- 1 builds the position loop and its trajectory
+    RESIDUAL       : integer range 0 to 1         := 0;  -- 1 compares the motor with its description
+    MODES          : integer range 0 to 1         := 0;  -- 1 builds voltage mode and changes of mode without a step
+    OVERMODULATION : integer range 0 to 1         := 0;  -- 1 lets the fundamental of the voltage go up to six-step
+    RING_ROWS      : integer range 0 to 2730      := 0;  -- telemetry rows of the ring, 42 in a block RAM; 0 leaves it out
+    GATE_ACTIVE    : integer range 0 to 1         := 1;  -- level of gate_high and gate_low at which a switch is on
+    TRIP_ACTIVE    : integer range 0 to 1         := 1;  -- level of trip that turns the gates off
+    BRAKE_ACTIVE   : integer range 0 to 1         := 1;  -- level of brake at which the resistor is on
+    TRIP_FILTER    : integer range 0 to 1023      := 0  -- longest pulse of trip without effect, clocks; 0: every pulse acts
   );
   port (
     aclk           : in  std_logic;  -- the one clock
@@ -159,15 +160,16 @@ begin
 
   registers : entity work.register_file
     generic map (
-      ADC_BITS      => ADC_BITS,
-      POSITION_BITS => POSITION_BITS,
-      CARRIER_HALF  => CARRIER_HALF,
-      CLOCK_HZ      => CLOCK_HZ,
-      ESTIMATORS    => ESTIMATORS,
-      REFERENCES    => REFERENCES,
-      POSITION_LOOP => POSITION_LOOP,
-      RESIDUAL      => RESIDUAL,
-      MODES         => MODES
+      ADC_BITS       => ADC_BITS,
+      POSITION_BITS  => POSITION_BITS,
+      CARRIER_HALF   => CARRIER_HALF,
+      CLOCK_HZ       => CLOCK_HZ,
+      ESTIMATORS     => ESTIMATORS,
+      REFERENCES     => REFERENCES,
+      POSITION_LOOP  => POSITION_LOOP,
+      RESIDUAL       => RESIDUAL,
+      MODES          => MODES,
+      OVERMODULATION => OVERMODULATION
     )
     port map (
       clk               => aclk,
@@ -235,14 +237,15 @@ begin
 
   core : entity work.fluxproof
     generic map (
-      ADC_BITS      => ADC_BITS,
-      POSITION_BITS => POSITION_BITS,
-      CARRIER_HALF  => CARRIER_HALF,
-      ESTIMATORS    => ESTIMATORS,
-      REFERENCES    => REFERENCES,
-      POSITION_LOOP => POSITION_LOOP,
-      RESIDUAL      => RESIDUAL,
-      MODES         => MODES
+      ADC_BITS       => ADC_BITS,
+      POSITION_BITS  => POSITION_BITS,
+      CARRIER_HALF   => CARRIER_HALF,
+      ESTIMATORS     => ESTIMATORS,
+      REFERENCES     => REFERENCES,
+      POSITION_LOOP  => POSITION_LOOP,
+      RESIDUAL       => RESIDUAL,
+      MODES          => MODES,
+      OVERMODULATION => OVERMODULATION
     )
     port map (
       clk             => aclk,

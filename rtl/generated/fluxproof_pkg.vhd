@@ -128,6 +128,7 @@ package fluxproof_pkg is
     l_q              : unsigned(INDUCTANCE_W - 1 downto 0);  -- inductance, q axis
     lambda_mg        : signed(PU_W - 1 downto 0);  -- magnet flux linkage
     k_chord          : unsigned(16 downto 0);  -- (sample time)**2 / 24, per unit
+    k_ripple         : signed(PU_W - 1 downto 0);  -- bandwidth of the current loop, for the ripple of over-modulation
     u_d_ext          : signed(PU_W - 1 downto 0);  -- voltage of voltage mode, d axis
     u_q_ext          : signed(PU_W - 1 downto 0);  -- voltage of voltage mode, q axis
     u_step           : signed(PU_W - 1 downto 0);  -- largest change of a voltage of voltage mode per sample
@@ -1011,6 +1012,10 @@ package fluxproof_pkg is
   constant REGENERATION_LIMIT_SLOPE_W : natural := 16;
   constant REGENERATION_LIMIT_DROP : natural := 8;
 
+  -- ripple_voltage: none: docs/overmodulation.md
+  constant RIPPLE_VOLTAGE_LATENCY : positive := 10;
+  constant RIPPLE_VOLTAGE_DROP : natural := 16;
+
   -- speed_pi: 001, section 5.3: speed regulator with limited current reference
   constant SPEED_PI_LATENCY : positive := 5;
   constant SPEED_PI_DROP_P : natural := 4;
@@ -1272,6 +1277,17 @@ package fluxproof_pkg is
   constant V_DEAD_ADALINE_TO_LEG : natural := 20;
   constant V_DEAD_ADALINE_FINE_TO_LEG : natural := 7;
 
+  -- voltage_ripple: none: docs/overmodulation.md
+  constant VOLTAGE_RIPPLE_LATENCY : positive := 11;
+  constant VOLTAGE_RIPPLE_VECTOR : natural := 90112;
+  constant VOLTAGE_RIPPLE_MEAN_W : natural := 24;
+  constant VOLTAGE_RIPPLE_FADE_MEAN : natural := 4;
+  constant VOLTAGE_RIPPLE_FADE : natural := 3;
+  constant VOLTAGE_RIPPLE_SHOWN : natural := 6;
+  constant VOLTAGE_RIPPLE_RIPPLE_W : natural := 22;
+  constant VOLTAGE_RIPPLE_DROP : natural := 11;
+  constant VOLTAGE_RIPPLE_TO_PU : natural := 7;
+
   -- winding_resistance: 000, eq. (12)
   constant WINDING_RESISTANCE_LATENCY : positive := 8;
   constant WINDING_RESISTANCE_DROP_TCR : natural := 12;
@@ -1381,6 +1397,42 @@ package fluxproof_pkg is
 
   -- gate_generation: 001, section 5.2, IGBT pulse generation
   constant GATE_GENERATION_LATENCY : positive := 1;
+
+  -- overmodulation: none: docs/overmodulation.md
+  constant OVERMODULATION_LATENCY : positive := 14;
+  constant OVERMODULATION_DROP_ASKED : natural := 15;
+  constant OVERMODULATION_ASKED_W : natural := 17;
+  constant OVERMODULATION_SQUARE_W : natural := 18;
+  constant OVERMODULATION_CIRCLE : natural := 715827883;
+  constant OVERMODULATION_DROP_STEP : natural := 20;
+  constant OVERMODULATION_STEPS : natural := 146;
+  constant OVERMODULATION_DROP_GAIN : natural := 13;
+  constant OVERMODULATION_DROP_INVERSE : natural := 2;
+  constant OVERMODULATION_SHORT_W : natural := 17;
+  constant OVERMODULATION_GAIN_BITS : natural := 16;
+  constant OVERMODULATION_DROP_SQUARE : natural := 16;
+  type overmodulation_gains_t is array (0 to 146) of unsigned(15 downto 0);
+  constant OVERMODULATION_GAINS : overmodulation_gains_t := (  -- U(3,13)
+    16x"2000", 16x"2000", 16x"2001", 16x"2001", 16x"2002", 16x"2003", 16x"2005", 16x"2006",
+    16x"2007", 16x"2009", 16x"200b", 16x"200d", 16x"200f", 16x"2011", 16x"2014", 16x"2016",
+    16x"2019", 16x"201c", 16x"201f", 16x"2022", 16x"2025", 16x"2028", 16x"202c", 16x"202f",
+    16x"2033", 16x"2037", 16x"203b", 16x"2040", 16x"2044", 16x"2049", 16x"204d", 16x"2052",
+    16x"2057", 16x"205d", 16x"2062", 16x"2068", 16x"206e", 16x"2074", 16x"207a", 16x"2081",
+    16x"2087", 16x"208e", 16x"2095", 16x"209d", 16x"20a4", 16x"20ac", 16x"20b5", 16x"20bd",
+    16x"20c6", 16x"20cf", 16x"20d8", 16x"20e2", 16x"20ec", 16x"20f7", 16x"2102", 16x"210d",
+    16x"2119", 16x"2125", 16x"2132", 16x"213f", 16x"214d", 16x"215b", 16x"216a", 16x"217a",
+    16x"218a", 16x"219c", 16x"21ae", 16x"21c2", 16x"21d6", 16x"21ec", 16x"2204", 16x"221d",
+    16x"2238", 16x"2255", 16x"2276", 16x"229a", 16x"22c3", 16x"22f2", 16x"232a", 16x"2364",
+    16x"239f", 16x"23dc", 16x"241a", 16x"245a", 16x"249b", 16x"24de", 16x"2522", 16x"2568",
+    16x"25b0", 16x"25fa", 16x"2646", 16x"2694", 16x"26e4", 16x"2737", 16x"278c", 16x"27e3",
+    16x"283d", 16x"289a", 16x"28f9", 16x"295c", 16x"29c1", 16x"2a2b", 16x"2a97", 16x"2b08",
+    16x"2b7c", 16x"2bf4", 16x"2c71", 16x"2cf3", 16x"2d79", 16x"2e05", 16x"2e97", 16x"2f2e",
+    16x"2fcc", 16x"3071", 16x"311d", 16x"31d1", 16x"328e", 16x"3354", 16x"3424", 16x"34ff",
+    16x"35e6", 16x"36da", 16x"37dd", 16x"38ef", 16x"3a12", 16x"3b48", 16x"3c94", 16x"3df7",
+    16x"3f76", 16x"4113", 16x"42d2", 16x"44b9", 16x"46ce", 16x"4918", 16x"4ba2", 16x"4e76",
+    16x"51a4", 16x"5541", 16x"5969", 16x"5e41", 16x"6400", 16x"6af7", 16x"73a7", 16x"7ee9",
+    16x"8e51", 16x"a53e", 16x"e85e"
+  );
 
   -- pwm_compare: 001, section 5.2, IGBT pulse generation
   constant PWM_COMPARE_LATENCY : positive := 7;

@@ -21,18 +21,19 @@ use work.register_map_pkg.all;
 
 entity hil_register_file is
   generic (
-    ADC_BITS      : natural := 16;
-    POSITION_BITS : natural := 16;
-    CARRIER_HALF  : natural := 10000;
-    CLOCK_HZ      : natural := 200000000;
-    ESTIMATORS    : natural := 1;
-    REFERENCES    : natural := 0;
-    POSITION_LOOP : natural := 0;
-    RESIDUAL      : natural := 0;
-    MODES         : natural := 0;
-    ENCODER       : natural := 1;
-    CURRENTS      : natural := 1;
-    SPI_LINES     : natural := 4
+    ADC_BITS       : natural := 16;
+    POSITION_BITS  : natural := 16;
+    CARRIER_HALF   : natural := 10000;
+    CLOCK_HZ       : natural := 200000000;
+    ESTIMATORS     : natural := 1;
+    REFERENCES     : natural := 0;
+    POSITION_LOOP  : natural := 0;
+    RESIDUAL       : natural := 0;
+    MODES          : natural := 0;
+    OVERMODULATION : natural := 0;
+    ENCODER        : natural := 1;
+    CURRENTS       : natural := 1;
+    SPI_LINES      : natural := 4
   );
   port (
     clk                 : in  std_logic;
@@ -884,6 +885,10 @@ begin
         settings.omega_step <= signed(held(17 downto 0));
         written(180)        <= '1';
       end if;
+      if OVERMODULATION = 1 and (row(22) and column(5) and not sample_busy) = '1' then
+        settings.k_ripple <= signed(held(17 downto 0));
+        written(181)      <= '1';
+      end if;
       if RESIDUAL = 1 and (row(26) and column(0) and not sample_busy) = '1' then
         settings.residual_min <= unsigned(held(16 downto 0));
         written(208)          <= '1';
@@ -1521,6 +1526,7 @@ begin
         settings.u_step           <= (others => '0');
         settings.i_step           <= (others => '0');
         settings.omega_step       <= to_signed(1, 18);
+        settings.k_ripple         <= (others => '0');
         settings.residual_min     <= (others => '0');
         settings.residual_w       <= (others => '0');
         settings.residual_i       <= (others => '0');
@@ -1796,7 +1802,8 @@ begin
   shown(8)           <= std_logic_vector(to_unsigned(POSITION_LOOP, 32));
   shown(9)           <= std_logic_vector(to_unsigned(RESIDUAL, 32));
   shown(10)          <= std_logic_vector(to_unsigned(MODES, 32));
-  shown(11 to 16)    <= (others => (others => '0'));
+  shown(11)          <= std_logic_vector(to_unsigned(OVERMODULATION, 32));
+  shown(12 to 16)    <= (others => (others => '0'));
   shown(17)          <= "0000000000000000000000000000000" & clear_trip;
   shown(18)          <= "0000000000000000000000000000000" & clear_faults_in;
   shown(19 to 26)    <= (others => (others => '0'));

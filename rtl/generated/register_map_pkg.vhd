@@ -43,21 +43,21 @@ package body register_map_pkg is
 
   constant ACCESS_OF : access_t :=
   (
-    0 to 10 | 32 to 48 | 50 to 59 | 184 to 185 | 214 to 221 | 248 to 251 | 256 to 258 | 272 to 282 | 284 to 292 | 576 to 587                                                                                                                          => REGISTER_READ_ONLY,
-    11 to 15 | 31 | 49 | 60 to 63 | 107 | 147 | 158 to 159 | 181 to 183 | 186 to 207 | 225 to 239 | 252 to 255 | 259 | 266 to 271 | 283 | 293 to 319 | 375 to 511 | 518 to 519 | 531 | 535 | 540 to 543 | 558 to 559 | 565 to 567 | 575 | 588 to 1023 => REGISTER_NONE,
+    0 to 11 | 32 to 48 | 50 to 59 | 184 to 185 | 214 to 221 | 248 to 251 | 256 to 258 | 272 to 282 | 284 to 292 | 576 to 587                                                                                                                          => REGISTER_READ_ONLY,
+    12 to 15 | 31 | 49 | 60 to 63 | 107 | 147 | 158 to 159 | 182 to 183 | 186 to 207 | 225 to 239 | 252 to 255 | 259 | 266 to 271 | 283 | 293 to 319 | 375 to 511 | 518 to 519 | 531 | 535 | 540 to 543 | 558 to 559 | 565 to 567 | 575 | 588 to 1023 => REGISTER_NONE,
     16 to 17 | 19 | 26 to 27 | 240 to 247 | 260 to 265 | 512 to 517 | 520 to 530 | 532 to 534 | 536 to 539 | 544 to 557 | 560 to 564 | 568 to 574                                                                                                     => REGISTER_AT_ONCE,
-    18 | 20 to 25 | 28 to 30 | 64 to 106 | 108 to 146 | 148 to 157 | 160 to 180 | 208 to 213 | 222 to 224 | 320 to 374                                                                                                                                => REGISTER_BETWEEN
+    18 | 20 to 25 | 28 to 30 | 64 to 106 | 108 to 146 | 148 to 157 | 160 to 181 | 208 to 213 | 222 to 224 | 320 to 374                                                                                                                                => REGISTER_BETWEEN
   );
 
   constant RANGE_OF : range_t :=
   (
-    0 to 15 | 31 to 63 | 107 | 147 | 158 to 159 | 161 | 170 to 171 | 181 to 207 | 214 to 221 | 225 to 239 | 248 to 259 | 266 to 319 | 375 to 511 | 518 to 519 | 531 | 535 | 540 to 543 | 558 to 559 | 565 to 567 | 575 to 1023 => to_unsigned(0, REGISTER_RANGE_W),
+    0 to 15 | 31 to 63 | 107 | 147 | 158 to 159 | 161 | 170 to 171 | 182 to 207 | 214 to 221 | 225 to 239 | 248 to 259 | 266 to 319 | 375 to 511 | 518 to 519 | 531 | 535 | 540 to 543 | 558 to 559 | 565 to 567 | 575 to 1023 => to_unsigned(0, REGISTER_RANGE_W),
     16 to 19 | 23 | 25 | 29 to 30 | 74 | 83 | 112 | 144 | 148 | 160 | 169 | 175 | 240 to 241 | 260 to 262 | 327 | 334 to 336 | 339 | 342 to 343 | 350 to 354 | 368 | 514 to 515 | 517 | 539 | 564                              => to_unsigned(15, REGISTER_RANGE_W),
     20 to 22 | 28 | 67 to 69 | 71 | 90 | 176 to 177 | 516 | 548 to 551                                                                                                                                                         => to_unsigned(5, REGISTER_RANGE_W),
     24 | 109 to 111 | 568 to 569                                                                                                                                                                                               => to_unsigned(6, REGISTER_RANGE_W),
     26 to 27 | 243 | 265 | 344 | 346 | 530                                                                                                                                                                                     => to_unsigned(20, REGISTER_RANGE_W),
     64 to 66 | 70 | 95 | 102 | 105 | 132 | 135 | 145 | 150 | 152 | 163 | 247 | 337 | 348 to 349 | 365 | 371 | 373 to 374 | 555                                                                                                 => to_unsigned(27, REGISTER_RANGE_W),
-    72 | 82 | 91 | 98 | 101 | 103 to 104 | 106 | 115 to 122 | 138 | 143 | 154 | 156 to 157 | 164 | 174 | 178 to 179 | 208 | 222 to 224 | 242 | 323 | 370 | 520 | 533 | 557 | 573 to 574                                        => to_unsigned(29, REGISTER_RANGE_W),
+    72 | 82 | 91 | 98 | 101 | 103 to 104 | 106 | 115 to 122 | 138 | 143 | 154 | 156 to 157 | 164 | 174 | 178 to 179 | 181 | 208 | 222 to 224 | 242 | 323 | 370 | 520 | 533 | 557 | 573 to 574                                  => to_unsigned(29, REGISTER_RANGE_W),
     73                                                                                                                                                                                                                         => to_unsigned(8, REGISTER_RANGE_W),
     75 | 212 | 263 | 324 | 328 to 329 | 340 | 562 to 563                                                                                                                                                                       => to_unsigned(30, REGISTER_RANGE_W),
     76 | 80 to 81 | 84 to 89 | 97 | 108 | 123 | 140 | 142 | 149 | 151 | 153 | 162 | 172 to 173 | 209 to 210 | 523 to 525 | 536 to 538 | 570                                                                                    => to_unsigned(37, REGISTER_RANGE_W),

@@ -2,10 +2,12 @@
 -- Purpose: symmetrical space-vector modulation, stator voltage to three duties, without a divider.
 --   x = u_alpha/u_dc,  y = sqrt(3)/2*u_beta/u_dc,  by inverse and inverse_beta of u_dc_processing
 --   legs a = x, b = -x/2 + y, c = -x/2 - y;  duty = 1/2 + leg + mid(a,b,c)/2
--- Formats: products 33 fraction bits; x, y S(1,17); legs S(3,18), exact; duty U(1,16), 0 to 1.
+-- Formats: products 33 fraction bits; x, y S(1,17); legs S(3,18), exact; duty U(1,16), 0 to 1.  With OVERMODULATION = 1
+-- x, y S(3,17) and legs S(5,18).
 -- Latency: 5.  Interval: 1.
 -- Rounding: half up.  x and y need no limiter: voltage_limit allows less than one bus voltage, because k_u_max is
--- below 1.  The duties are limited to 0 and 1.
+-- below 1, times the gain of overmodulation less than eight.  The duties are limited to 0 and 1: beyond the hexagon the
+-- voltage is its nearest point.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -14,6 +16,9 @@ use work.fixed_pkg.all;
 use work.fluxproof_pkg.all;
 
 entity svm is
+  generic (
+    OVERMODULATION : natural range 0 to 1 := 0  -- 1: voltages beyond the hexagon, up to eight bus voltages
+  );
   port (
     clk          : in  std_logic;
     rst          : in  std_logic;
@@ -31,7 +36,8 @@ end entity svm;
 
 architecture rtl of svm is
   constant LATENCY   : positive := SVM_LATENCY;
-  constant LEG_W     : positive := SVM_SCALED_W + 3;
+  constant SCALED_W  : positive := SVM_SCALED_W + 2 * OVERMODULATION;
+  constant LEG_W     : positive := SCALED_W + 3;
   constant SUM_W     : positive := LEG_W + 2;
   constant INVERSE_W : positive := U_DC_PROCESSING_INVERSE_W;
 
@@ -40,8 +46,8 @@ architecture rtl of svm is
   signal valid           : std_logic_vector(0 to LATENCY);
   signal by_inverse      : signed(INVERSE_W downto 0);
   signal by_inverse_beta : signed(INVERSE_W downto 0);
-  signal x_3             : signed(SVM_SCALED_W - 1 downto 0);
-  signal y_3             : signed(SVM_SCALED_W - 1 downto 0);
+  signal x_3             : signed(SCALED_W - 1 downto 0);
+  signal y_3             : signed(SCALED_W - 1 downto 0);
   signal twice_x         : signed(LEG_W - 1 downto 0);
   signal triple_x        : signed(LEG_W - 1 downto 0);
   signal twice_y         : signed(LEG_W - 1 downto 0);

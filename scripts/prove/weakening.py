@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Properties of field weakening: references within their circle, a voltage loop that releases from every state."""
+"""Properties of field weakening and over-modulation: references in their circle, releases, the ends of a table."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from scripts.prove.proof import Fault, Proof, committed
 
 LOOP = "control/voltage_loop.vhd"
 REFERENCE = "control/current_reference.vhd"
+HEXAGON = "modulation/overmodulation.vhd"
 
 PROOFS = (
     Proof(
@@ -34,5 +35,20 @@ PROOFS = (
         faults=(
             Fault("i_q of the table not limited", REFERENCE, "within(state.i_q, unsigned(i_q_max), 0);", "state.i_q;"),
         ),
+    ),
+    Proof(
+        name="overmodulation_gain",
+        says="the gain is that of the circle within it, of a step of the table beyond, of its last beyond the table",
+        entity="overmodulation",
+        harness=committed("overmodulation.sv"),
+        faults=(
+            Fault("a gain within the circle", HEXAGON, "index_9 <= 0;", "index_9 <= OVERMODULATION_STEPS;"),
+            Fault("end of the table wraps", HEXAGON, "elsif step_8 >= OVERMODULATION_STEPS then", "elsif false then"),
+        ),
+        depth=16,
+        seen=("beyond_8", "index_9"),
+        free=("excess_7",),
+        assumed="samples at least 14 clocks apart; any voltage and bus",
+        search_depth=40,
     ),
 )  # fmt: skip

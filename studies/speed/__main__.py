@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import base64
 import io
-import os
 import sys
 from html import escape
-from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -20,24 +18,16 @@ from fluxproof.checkout import BUILD
 from fluxproof.cosim.runs import InVerilator, Named
 from fluxproof.files import write_json, write_text
 from golden_model.torque_table import Plane
-from studies.real.brusa_loop import measured_map
-from studies.speed import figures
+from studies.speed import figures, overmodulation
 
 OUT = BUILD / "studies"
 PERIODS, CARRIER_HALF = 3000, 128  # of the comparison with the RTL
 
 
-def brusa():
-    """The measured map, or None where it is not there."""
-    folder = os.environ.get("FLUXPROOF_RECORDINGS")
-    file = Path(folder or "") / "brusa_flux_map" / "brusa_meas.csv"
-    return measured_map(file) if folder and file.is_file() else None
-
-
 def rtl() -> list[dict]:
     """The RTL against the golden core over the border and in the speed loop."""
     rows = []
-    for name in ("over_the_border", "speed_loop"):
+    for name in ("over_the_border", "over_the_hexagon", "speed_loop"):
         job = InVerilator(f"speed_{name}", Named(f"studies.speed.drives:{name}", (CARRIER_HALF, PERIODS)))
         job.carry_out()
         counts = job.summary()
@@ -85,13 +75,13 @@ def page(rows: list[dict], image: str) -> str:
 def main() -> int:
     """Measure, write list and page, print the list; 1 if a figure misses its target."""
     rows, curves, sags = [], {}, {}
-    for case in figures.cases(brusa()):
+    for case in figures.cases(figures.brusa()):
         plane = Plane(case.truth, case.drive.machine.pole_pairs, case.drive.current_limit_a)
         rows += [*figures.loss(case, plane), *figures.wrong_maps(case, plane), *figures.start(case, plane)]
         more, curves[case.name] = figures.curve(case, plane)
         rows += [*more, *figures.hostile(case, plane, 0.0), *figures.hostile(case, plane, 1e-3)]
         more, sags[case.name] = figures.sag(case, plane)
-        rows += more
+        rows += [*more, *overmodulation.gained(case, plane), *overmodulation.to_the_end(case, plane)]
     if "--no-rtl" not in sys.argv[1:]:
         rows += rtl()
     OUT.mkdir(parents=True, exist_ok=True)

@@ -74,7 +74,22 @@ def scene(drive, torque_nm, speed_rad_s, u_dc=None, enable=None) -> Scenario:
 
 def over_the_border(carrier_half: int, periods: int) -> ClosedLoop:
     """Paper 001's motor across base speed and back with torques of both signs, a bus sag and a stop of the gates."""
-    drive = drives.with_carrier(weakened(DRIVES / "paper001.toml"), carrier_half)
+    return _across(drives.with_carrier(weakened(DRIVES / "paper001.toml"), carrier_half), periods)
+
+
+def over_the_hexagon(carrier_half: int, periods: int) -> ClosedLoop:
+    """The same with over-modulation."""
+    return _across(drives.with_carrier(overmodulated(weakened(DRIVES / "paper001.toml")), carrier_half), periods)
+
+
+def overmodulated(drive, **control):
+    """The drive with over-modulation; ``control``: keys of [control]."""
+    core = dataclasses.replace(drive.core, overmodulation=True)
+    return dataclasses.replace(drive, core=core, control=dataclasses.replace(drive.control, **control))
+
+
+def _across(drive, periods: int) -> ClosedLoop:
+    """The scene of both."""
     k = np.arange(periods) / periods
     speed = drive.machine.rated_speed_rad_s * (0.4 + 2.4 * np.sin(np.pi * k))
     torque = np.where(np.floor(9 * k) % 3 == 0, 2.5, np.where(np.floor(9 * k) % 3 == 1, 9.0, -4.0))

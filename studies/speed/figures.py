@@ -8,7 +8,9 @@ computed from the plant's own flux linkage, never from the table.
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 
@@ -19,6 +21,7 @@ from golden_model import torque_table
 from golden_model.drive import Drive, load
 from golden_model.registers import registers
 from golden_model.units import to_si
+from studies.real.brusa_loop import measured_map
 from studies.speed.drives import reluctance, saturated, scene, weakened
 
 SETTLED = 0.25  # of a run: its last part, over which means are taken
@@ -43,6 +46,13 @@ def plant_flux(machine: Machine, i_max: float, points: int = 61):
     axis_d, axis_q = np.linspace(-i_max, i_max, 2 * points - 1), np.linspace(0.0, i_max, points)
     psi = np.array([[flux_from_currents(params, machine.magnet_flux_wb, d, q) for q in axis_q] for d in axis_d])
     return torque_table.measured(axis_d, axis_q, psi[:, :, 0], psi[:, :, 1])
+
+
+def brusa() -> FluxMap | None:
+    """The measured map, or None where FLUXPROOF_RECORDINGS does not have it."""
+    folder = os.environ.get("FLUXPROOF_RECORDINGS")
+    file = Path(folder or "") / "brusa_flux_map" / "brusa_meas.csv"
+    return measured_map(file) if folder and file.is_file() else None
 
 
 def cases(brusa_map: FluxMap | None = None) -> list[Case]:

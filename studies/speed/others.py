@@ -34,7 +34,6 @@ from golden_model.registers import registers
 from golden_model.torque_table import Plane
 from golden_model.units import from_si, to_si
 from studies.speed import figures
-from studies.speed.__main__ import brusa
 
 SPEEDS, TORQUES, SECONDS = (1.2, 1.5, 2.0, 3.0), (0.25, 0.5, 0.75, 0.98), 0.25
 VOLTAGE = 0.98  # of the circle, as the core's voltage_target
@@ -232,7 +231,7 @@ def rows_of(case, name: str) -> list[dict]:
 def main() -> int:
     """All methods on all plants, or those named: a line for each figure, and build/studies/speed_others.json."""
     rows = []
-    for case in figures.cases(brusa()):
+    for case in figures.cases(figures.brusa()):
         for name in sys.argv[1:] or METHODS:
             for one in rows_of(case, name):
                 head = f"{one['experiment']:20} {one['method']:14} {one['figure']:45}"

@@ -23,7 +23,10 @@ CLOCKS = 80
 def instances(top: Path) -> dict[str, str]:
     """{label: entity} of everything the top, without what is off by default, and its protection instantiate."""
     text = re.sub(
-        r"(REFERENCES|POSITION_LOOP|RESIDUAL|MODES) = 1 generate.*?else generate", "", top.read_text(), flags=re.DOTALL
+        r"(REFERENCES|POSITION_LOOP|RESIDUAL|MODES|OVERMODULATION) = 1 generate.*?else generate",
+        "",
+        top.read_text(),
+        flags=re.DOTALL,
     )
     text += (top.parent / "io" / "protection.vhd").read_text()
     found = dict(re.findall(r"^\s+(\w+)\s*: entity work\.(\w+)", text, re.MULTILINE))

@@ -28,6 +28,7 @@ GENERICS = {
     "position_loop": 0,
     "residual": 1,
     "modes": 0,
+    "overmodulation": 0,
 }
 MAP = registers()
 WRITABLE = [r for r in MAP.values() if r.kind.writable]

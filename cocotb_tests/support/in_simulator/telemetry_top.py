@@ -19,6 +19,7 @@ GENERICS = {
     "POSITION_LOOP": 0,
     "RESIDUAL": 0,
     "MODES": 0,
+    "OVERMODULATION": 0,
     "DEPTH_BITS": 9,
 }
 
@@ -51,7 +52,8 @@ begin
   core : entity work.fluxproof
     generic map (ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS, CARRIER_HALF => CARRIER_HALF,
                  ESTIMATORS => ESTIMATORS, REFERENCES => REFERENCES, POSITION_LOOP => POSITION_LOOP,
-                 RESIDUAL => RESIDUAL, MODES => MODES)
+                 RESIDUAL => RESIDUAL, MODES => MODES,
+                 OVERMODULATION => OVERMODULATION)
     port map ({", ".join(f"{name} => {name}" for name in core)});
   stream : entity work.telemetry
     generic map (ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS, DEPTH_BITS => DEPTH_BITS)

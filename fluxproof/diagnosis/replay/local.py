@@ -39,6 +39,7 @@ NEEDS = {
     ),
     "torque": ("lambda_d", "lambda_q"),
 }
+AFTER_GAIN = ("duty_a", "duty_b", "duty_c", "compare_a", "compare_b", "compare_c")
 BEFORE = {
     **dict.fromkeys(("u_applied_alpha", "u_applied_beta"), ("compare_a", "compare_b", "compare_c")),
     **dict.fromkeys(
@@ -68,7 +69,9 @@ def check_rows(run: Run, start: int, stop: int) -> tuple[int, list[str], dict[st
 def _check(run: Run, start, stop):
     """check_rows for a number of rows that fits the memory."""
     signals = checkable(run.names)
-    wanted = np.array([signals.get(name, None) is not None for name in FIELDS])
+    if run.config.overmodulation:  # the gain of the modulator depends on the voltages before their limit
+        signals = {name: later for name, later in signals.items() if name not in AFTER_GAIN}
+    wanted = np.array([signals.get(name) is not None for name in FIELDS])
     later = np.array([signals.get(name, False) for name in FIELDS])
     full = np.zeros((stop - start, len(FIELDS)), np.int64)
     for n, name in enumerate(FIELDS):
