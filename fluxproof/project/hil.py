@@ -37,7 +37,8 @@ def thermal_of(plant: Plant) -> Thermal | None:
     if machine.temperature_magnet_c != machine.temperature_winding_c:
         raise DriveError(
             f"[plant.machine] temperature_magnet_c = {machine.temperature_magnet_c:g} differs from "
-            f"temperature_winding_c = {machine.temperature_winding_c:g}: with [plant.hil] both warm from one temperature, the ambient's"
+            f"temperature_winding_c = {machine.temperature_winding_c:g}: "
+            "with [plant.hil] both warm from one temperature, the ambient's"
         )
     return Thermal(*given, ambient_c=machine.temperature_winding_c)
 
