@@ -63,7 +63,7 @@ def load_words(
         if thermal is None:  # what motor_temp_winding shows
             values["ambient"] = code("ambient", machine.temperature_winding_c, motor_heat.CELSIUS)
         values |= sensor_registers(drive, sensors, scale.current_a, scale.voltage_v)
-        values["k_filtex"] = filter_register(scale, current_filter_s)
+        values["k_filter"] = filter_register(scale, current_filter_s)
         tables = motor_tables(scale, at_its_temperatures(machine) if thermal is None else machine)
     except ValueError as error:
         raise DriveError(str(error)) from None
