@@ -129,7 +129,7 @@ def _slips(value, fmt) -> list[int]:
 def _registers_near(run, names):
     """Registers by distance: of the block that differs, of hidden blocks upstream, then all."""
     near = [OWNER[first_in_flow(names)]]
-    near += reversed(hidden_before(near[0], run.names))
+    near += reversed(hidden_before(near[0], run.names, run.config))
     near += [name for name in ORDER if name not in near]
     return list(dict.fromkeys(p.name for name in near for p in fluxproof.WIRING[name][0].BLOCK.registers))
 

@@ -206,7 +206,7 @@ def _result(run, recording, row, instance, signal, golden, cause, names) -> Digi
         "golden_si": golden * scale,
         "unit": physical,
         "differing": sorted(names),
-        "hidden": [] if is_input or cause else hidden_before(instance, run.names),
+        "hidden": [] if is_input or cause else hidden_before(instance, run.names, run.config),
         "cause": cause,
     }
     model = recording.meta.get("telemetry", {}).get("core", {}).get("golden_model")

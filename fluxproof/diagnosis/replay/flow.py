@@ -69,16 +69,18 @@ def _awaited(name: str, follower: str) -> list[str]:
     ]
 
 
-def hidden_before(instance: str, shown) -> list[str]:
+def hidden_before(instance: str, shown, config: fluxproof.Config) -> list[str]:
     """Instances upstream of ``instance`` whose outputs are not among the signals ``shown``, in data-flow order.
 
-    A fault in one of them first appears at ``instance`` if every signal between them is hidden.
+    A fault in one of them first appears at ``instance`` if every signal between them is hidden.  What the generics of
+    ``config`` leave out is not upstream of anything.
     """
+    absent = {name for generic, part in fluxproof.PARTS.items() if not getattr(config, generic) for name in part}
     seen, waiting = set(), [(name, instance) for name in fluxproof.WIRING[instance][1]]
     while waiting:
         name, follower = waiting.pop()
         hidden = [s for s in outputs_of(name) if s not in shown]
-        if (name, follower) in seen or not hidden or name == "latch":
+        if (name, follower) in seen or not hidden or name == "latch" or name in absent:
             continue
         seen.add((name, follower))
         if len(hidden) == len(outputs_of(name)):
