@@ -37,10 +37,14 @@ static volatile sig_atomic_t asked_to_stop; /* the number of the signal */
 
 /* ------------------------------------------------------------------ small helpers */
 
+static bool ours; /* the core is the one that this program was compiled for */
+
 /* The gates off; then the encoder's own angle again, with every fault of the front ends, whoever left them otherwise. */
 static bool rest(void)
 {
     bool done = bus_write(AT(enable), 0);
+    if (!ours)
+        return done;
 #ifdef FLUXPROOF_ENCODER
     done = bus_write(AT(forced_rate), 0) && done;
     done = bus_write(AT(position_source), 0) && done;
@@ -188,6 +192,7 @@ static void check_generics(void)
 
 static void load_drive(bool speed_mode)
 {
+    ours = true;
     if (!rest())
         fail("the core refused to be put to rest");
     put(AT(omega_ref), 0);
