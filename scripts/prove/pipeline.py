@@ -77,13 +77,14 @@ endmodule
 
 
 def fault_files(block: Block) -> list[str]:
-    """The block's file, then those of its sub-entities."""
-    own = block.vhdl
-    inner = re.findall(r"entity work\.(\w+)", (ROOT / "rtl" / own).read_text())
-    return [
-        own,
-        *(str(p.relative_to(ROOT / "rtl")) for name in inner for p in (ROOT / "rtl").rglob(f"{name}.vhd")),
-    ]
+    """The block's file, then those of its sub-entities, and of theirs."""
+    rtl = ROOT / "rtl"
+    files = [block.vhdl]
+    for file in files:  # grows as it goes
+        inner = re.findall(r"entity work\.(\w+)", (rtl / file).read_text())
+        found = [str(p.relative_to(rtl)) for name in inner for p in rtl.rglob(f"{name}.vhd")]
+        files += [name for name in dict.fromkeys(found) if name not in files]
+    return files
 
 
 # Code patterns of the blocks in the order of preference: (what the fault breaks, text, its replacement).
