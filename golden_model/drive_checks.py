@@ -4,19 +4,17 @@
 import math
 
 from golden_model.common.input_filter import FILTER
-from golden_model.drive_keys import DriveError
+from golden_model.drive_keys import DriveError, refuse
 from golden_model.fluxproof import SAMPLE_INTERVAL
 from golden_model.formats import PU, VECTOR
 from golden_model.front_ends import check_converters, check_encoder
 from golden_model.motion import check_position
-from golden_model.protection_limits import BRAKE_HYSTERESIS, default_u_dc_max_v, regen_end_v
+from golden_model.protection_checks import check_bootstrap, check_levels, check_regeneration
 
 CARRIER_HALF_RANGE = (8, 32767)  # generic CARRIER_HALF of rtl/fluxproof.vhd
 ON_OF_DEAD, ON_S = 0.05, 20e-9  # shortest time that a switch is on: of the dead time, and at least
 TURN_SAMPLES = 4.0 * math.pi  # register t_s is a fraction of half a radian at the base of the speed
 LEAST_MARGIN_DEG = 30.0  # of the current loop; with less it rings
-HURTS = 1.5  # times the current limit
-LEAST_WATCHDOG = 3.0  # sample times that are always allowed without a sample
 WHOLE = 1e-6  # relative; a decimal fraction with seven digits counts as exact
 
 
@@ -26,27 +24,23 @@ def check(drive):
         rule(drive)
 
 
-def _refuse(key, value, allowed):
-    raise DriveError(f"{key} = {value:g} is out of range: allowed is {allowed}")
-
-
 def _sample_time(drive):
     """The duties are updated at the valley, or at valley and peak."""
     given, period = drive.control.sample_time_s, drive.sample_time_s
     if given is not None and abs(given / period - 1.0) > WHOLE:
         frequency = f"[inverter] pwm_frequency_hz = {drive.inverter.pwm_frequency_hz:g}"
         part = "one PWM period" if drive.core.updates_per_period == 1 else "half a PWM period"
-        _refuse("[control] sample_time_s", given, f"{period:g} s, {part}, since {frequency}")
+        refuse("[control] sample_time_s", given, f"{period:g} s, {part}, since {frequency}")
 
 
 def _sampling(drive):
     """A sample belongs to the valley or peak that it is nearest to, and its voltage acts later."""
     delay, half = drive.sampling.delay_s, drive.sample_time_s / 2.0
     if not abs(delay) < half:
-        _refuse("[sampling] delay_s", delay, f"between -{half:g} and {half:g} s, half a sample time")
+        refuse("[sampling] delay_s", delay, f"between -{half:g} and {half:g} s, half a sample time")
     if drive.sampling_to_voltage_s < 0.0:
         most = drive.control.delay_samples * drive.sample_time_s
-        _refuse("[sampling] delay_s", delay, f"up to {most:g} s, [control] delay_samples")
+        refuse("[sampling] delay_s", delay, f"up to {most:g} s, [control] delay_samples")
 
 
 def _carrier(drive):
@@ -87,21 +81,21 @@ def _pulses(drive):
         raise DriveError("[inverter] min_on_time_s and min_pulse_s are both given: allowed is one of them")
     dead, pulse, half = i.dead_time_s, i.leg_pulse_s, 0.5 / i.pwm_frequency_hz
     if not dead < half:
-        _refuse("[inverter] dead_time_s", dead, f"above 0 and below half a PWM period, {half:g} s")
+        refuse("[inverter] dead_time_s", dead, f"above 0 and below half a PWM period, {half:g} s")
     if not dead < pulse:
-        _refuse("[inverter] dead_time_s", dead, f"above 0 and below min_pulse_s = {pulse:g} s")
+        refuse("[inverter] dead_time_s", dead, f"above 0 and below min_pulse_s = {pulse:g} s")
     least = max(ON_OF_DEAD * dead, ON_S)
     if i.on_time_s < least * (1.0 - WHOLE):
         why = f"{least:g} s, a twentieth of dead_time_s and {ON_S:g} s at least: shorter pulses do not turn a switch on"
         if i.min_on_time_s is not None:
-            _refuse("[inverter] min_on_time_s", i.min_on_time_s, f"at least {why}")
+            refuse("[inverter] min_on_time_s", i.min_on_time_s, f"at least {why}")
         seen = f"leave the switch {i.on_time_s:.4g} s"
         raise DriveError(
             f"[inverter] min_pulse_s = {pulse:g} and dead_time_s = {dead:g} {seen}: allowed is at least {why}"
         )
     if not pulse <= half:
         key = "min_pulse_s" if i.min_on_time_s is None else "dead_time_s + min_on_time_s"
-        _refuse(f"[inverter] {key}", pulse, f"up to half a PWM period, {half:g} s")
+        refuse(f"[inverter] {key}", pulse, f"up to half a PWM period, {half:g} s")
 
 
 def _low_side(drive):
@@ -114,18 +108,18 @@ def _low_side(drive):
     if settle is None:
         return
     if drive.core.updates_per_period == 2:
-        _refuse("[core] updates_per_period", 2, "1 with [sensors] low_side_settle_s: no lower switch is on at the peak")
+        refuse("[core] updates_per_period", 2, "1 with [sensors] low_side_settle_s: no lower switch is on at the peak")
     needed_s = settle + drive.inverter.dead_time_s + max(-drive.sampling.delay_s, 0.0)
     least = 4.0 * needed_s / period
     least = max(least, 4.0 * drive.sampling.delay_s / period)  # and the switch is on until then
     if not least < 1.0:
         most = max(0.25 * period - needed_s + settle, 0.0)
         why = f"a quarter of the PWM period, {period:g} s, lies before the sample at most, dead time included"
-        _refuse("[sensors] low_side_settle_s", settle, f"below {most:.4g} s: {why}")
+        refuse("[sensors] low_side_settle_s", settle, f"below {most:.4g} s: {why}")
     if not drive.control.voltage_reserve >= least * (1.0 - WHOLE):
         why = f"half of the low time, voltage_reserve / 4 of {period:g} s, lies before the sample"
         keys = f"[sensors] low_side_settle_s = {settle:g} and dead_time_s = {drive.inverter.dead_time_s:g}"
-        _refuse("[control] voltage_reserve", drive.control.voltage_reserve, f"at least {least:.4g} for {keys}: {why}")
+        refuse("[control] voltage_reserve", drive.control.voltage_reserve, f"at least {least:.4g} for {keys}: {why}")
 
 
 def _overmodulation(drive):
@@ -134,12 +128,12 @@ def _overmodulation(drive):
         return
     if not drive.core.overmodulation:
         why = "at most 1 without [core] overmodulation"
-        _refuse("[control] voltage_fundamental", drive.fundamental, why)
+        refuse("[control] voltage_fundamental", drive.fundamental, why)
     if not drive.core.estimators:
-        _refuse("[core] estimators", False, "true with overmodulation: the ripple is known from the applied voltage")
+        refuse("[core] estimators", False, "true with overmodulation: the ripple is known from the applied voltage")
     if drive.sensors.low_side_settle_s is not None:
         why = "at most 1 with [sensors] low_side_settle_s: beyond it a leg's lower switch is off for whole periods"
-        _refuse("[control] voltage_fundamental", drive.fundamental, why)
+        refuse("[control] voltage_fundamental", drive.fundamental, why)
 
 
 def _position_pairs(drive):
@@ -151,11 +145,11 @@ def _position_pairs(drive):
     if pairs % given:
         allowed = [str(n) for n in range(1, pairs + 1) if pairs % n == 0]
         why = f"a divisor of [machine] pole_pairs, {', '.join(allowed)}: else one code is several electrical angles"
-        _refuse(key, given, why)
+        refuse(key, given, why)
     if kind in ("abz", "hall"):
-        _refuse(key, given, f'1 with [encoder] kind = "{kind}", whose counts are those of a turn of the shaft')
+        refuse(key, given, f'1 with [encoder] kind = "{kind}", whose counts are those of a turn of the shaft')
     if drive.core.position_loop:
-        _refuse(key, given, "1 with [core] position_loop, which counts turns of the code as those of the shaft")
+        refuse(key, given, "1 with [core] position_loop, which counts turns of the code as those of the shaft")
 
 
 def _samples_per_turn(drive):
@@ -182,10 +176,10 @@ def _voltage(drive):
     bus, limit = drive.inverter.dc_bus_v, math.sqrt(3.0) * drive.bases.voltage_v
     reach = drive.sensors.u_dc_range_v
     if bus > reach:
-        _refuse("[inverter] dc_bus_v", bus, f"up to [sensors] u_dc_range_v = {reach:g} V")
+        refuse("[inverter] dc_bus_v", bus, f"up to [sensors] u_dc_range_v = {reach:g} V")
     if bus > limit:
         base = "[bases] voltage_v" if drive.base_choice.voltage_v else "[sensors] u_dc_range_v / 2"
-        _refuse("[inverter] dc_bus_v", bus, f"up to sqrt(3) * {base} = {limit:g} V")
+        refuse("[inverter] dc_bus_v", bus, f"up to sqrt(3) * {base} = {limit:g} V")
 
 
 def _current(drive):
@@ -193,10 +187,10 @@ def _current(drive):
     if limit > reach:
         given = drive.control.current_limit_a is not None
         key = "[control] current_limit_a" if given else "[machine] rated_current_a"
-        _refuse(key, limit, f"up to [sensors] current_range_a = {reach:g} A")
+        refuse(key, limit, f"up to [sensors] current_range_a = {reach:g} A")
     most = VECTOR * PU.lsb * drive.bases.current_a
     if limit > most:
-        _refuse("the current limit", limit, f"up to {most:g} A, 1.375 * [bases] current_a: clarke limits beyond")
+        refuse("the current limit", limit, f"up to {most:g} A, 1.375 * [bases] current_a: clarke limits beyond")
 
 
 def _flux(drive):
@@ -206,23 +200,23 @@ def _flux(drive):
         flux, most = getattr(drive.machine, key) * drive.current_limit_a, 2.0 * drive.bases.flux_wb
         if flux > most:
             why = "twice the flux base, voltage over electrical speed base; see [bases]"
-            _refuse(f"[machine] {key} times the current limit", flux, f"up to {most:g} Wb, {why}")
+            refuse(f"[machine] {key} times the current limit", flux, f"up to {most:g} Wb, {why}")
 
 
 def _trip_filter(drive):
     clocks, most = drive.core.trip_filter_clocks, FILTER.hi
     if clocks > most:
         allowed = f"up to {most / drive.core.clock_hz:g} s, {most} clocks of [core] clock_hz = {drive.core.clock_hz:g}"
-        _refuse("[core] trip_filter_s", drive.core.trip_filter_s, allowed)
+        refuse("[core] trip_filter_s", drive.core.trip_filter_s, allowed)
 
 
 def _codes(drive):
     top = 2**drive.sensors.adc_bits - 1
     for code in drive.sensors.current_offset_code or ():
         if not 0 <= code <= top:
-            _refuse("[sensors] current_offset_code", code, f"0 to {top}")
+            refuse("[sensors] current_offset_code", code, f"0 to {top}")
     if drive.sensors.u_dc_offset_code > top:
-        _refuse("[sensors] u_dc_offset_code", drive.sensors.u_dc_offset_code, f"0 to {top}")
+        refuse("[sensors] u_dc_offset_code", drive.sensors.u_dc_offset_code, f"0 to {top}")
 
 
 def _speed_loop(drive):
@@ -232,7 +226,7 @@ def _speed_loop(drive):
         return
     for key in ("inertia_kgm2", "magnet_flux_wb"):
         if getattr(machine, key) <= 0.0:
-            _refuse(f"[machine] {key}", 0.0, "above 0, since [control] speed_bandwidth_hz is given")
+            refuse(f"[machine] {key}", 0.0, "above 0, since [control] speed_bandwidth_hz is given")
 
 
 def _current_loop(drive):
@@ -243,7 +237,7 @@ def _current_loop(drive):
     if asked * four_delays >= 1.0:
         reason = f"{delay / drive.sample_time_s:g} samples of delay make the loop unstable from there"
         limit = 1.0 / four_delays
-        _refuse("[control] current_bandwidth_hz", asked, f"below {limit:g} Hz; {reason}")
+        refuse("[control] current_bandwidth_hz", asked, f"below {limit:g} Hz; {reason}")
 
 
 def doubts(drive):
@@ -266,7 +260,7 @@ def _flux_loop(drive):
     least = control.speed_bandwidth_hz or 0.0
     if asked is not None and not least < asked < most:
         allowed = f"above speed_bandwidth_hz = {least:g} Hz and below current_bandwidth_hz = {most:g} Hz"
-        _refuse("[control] flux_bandwidth_hz", asked, allowed)
+        refuse("[control] flux_bandwidth_hz", asked, allowed)
 
 
 def _adaline_steps(drive):
@@ -274,88 +268,14 @@ def _adaline_steps(drive):
     control, machine = drive.control, drive.machine
     if control.v_dead_eta >= 0.125:
         why = "eq. (B.3), 2*eta*D**2 < 1 with |D| = 2; the estimate of V_dead would diverge"
-        _refuse("[control] v_dead_eta", control.v_dead_eta, f"below 0.125: {why}")
+        refuse("[control] v_dead_eta", control.v_dead_eta, f"below 0.125: {why}")
     rated = machine.pole_pairs * machine.rated_speed_rad_s
     most = 0.5 / rated / rated
     if control.psi_eta is not None and control.psi_eta >= most:
         why = f"eq. (B.3), 2*eta*omega**2 < 1 at the rated {rated:g} rad/s; the estimate of psi_m would diverge"
-        _refuse("[control] psi_eta", control.psi_eta, f"below {most:.4g} s2/rad2: {why}")
+        refuse("[control] psi_eta", control.psi_eta, f"below {most:.4g} s2/rad2: {why}")
     if not control.winding_temp_min_c < control.winding_temp_max_c:
-        _refuse("[control] winding_temp_min_c", control.winding_temp_min_c, "below winding_temp_max_c")
-
-
-def _protection(drive):
-    """A trip level must lie outside the operating range of the drive and inside the range of its sensors."""
-    p, limit, reach = drive.protection, drive.current_limit_a, drive.sensors.current_range_a
-    if p.current_trip_a is not None and not limit < p.current_trip_a <= reach:
-        allowed = f"above the current limit, {limit:g} A, up to [sensors] current_range_a = {reach:g} A"
-        _refuse("[protection] current_trip_a", p.current_trip_a, allowed)
-    bus, reach = drive.inverter.dc_bus_v, drive.sensors.u_dc_range_v
-    if p.u_dc_min_v is not None and not p.u_dc_min_v < bus:
-        _refuse("[protection] u_dc_min_v", p.u_dc_min_v, f"below [inverter] dc_bus_v = {bus:g} V")
-    if p.u_dc_max_v is not None and not bus < p.u_dc_max_v <= reach:
-        allowed = f"above [inverter] dc_bus_v = {bus:g} V, up to [sensors] u_dc_range_v = {reach:g} V"
-        _refuse("[protection] u_dc_max_v", p.u_dc_max_v, allowed)
-    most = p.u_dc_max_v or default_u_dc_max_v(drive)
-    if p.brake_on_v is not None and not bus < p.brake_on_v < most:
-        allowed = f"above [inverter] dc_bus_v = {bus:g} V and below u_dc_max_v = {most:g} V, which trips"
-        _refuse("[protection] brake_on_v", p.brake_on_v, allowed)
-    _brake_off(p, bus)
-    if p.overspeed_rad_s is not None and not p.overspeed_rad_s > drive.machine.rated_speed_rad_s:
-        _refuse("[protection] overspeed_rad_s", p.overspeed_rad_s, "above [machine] rated_speed_rad_s")
-    if p.trip_watchdog and not 1.0 < p.watchdog_periods <= (most := _watchdog_most(drive)):
-        allowed = (
-            f"above 1 up to {most:.3g}, while the current rises by half its limit; trip_watchdog = false ignores it"
-        )
-        _refuse("[protection] watchdog_periods", p.watchdog_periods, allowed)
-    if not p.watchdog_periods > 1.0:
-        _refuse("[protection] watchdog_periods", p.watchdog_periods, "above 1")
-    m = drive.machine
-    emf = m.pole_pairs * m.rated_speed_rad_s * m.magnet_flux_wb
-    if p.encoder_lost_v is not None and emf > 0.0 and not p.encoder_lost_v < emf:
-        _refuse("[protection] encoder_lost_v", p.encoder_lost_v, f"below {emf:.4g} V, the EMF at rated speed")
-
-
-def _brake_off(p, bus):
-    """The supply alone must not keep the brake resistor on."""
-    if p.brake_on_v is None:
-        if p.brake_off_v is not None:
-            raise DriveError("[protection] brake_off_v needs brake_on_v, from which the brake resistor is on")
-        return
-    if p.brake_off_v is None and not BRAKE_HYSTERESIS * p.brake_on_v > bus:
-        allowed = f"above {bus / BRAKE_HYSTERESIS:.4g} V, so that {BRAKE_HYSTERESIS:g} of it, where the resistor is off"
-        _refuse("[protection] brake_on_v", p.brake_on_v, f"{allowed} again, is above [inverter] dc_bus_v = {bus:g} V")
-    if p.brake_off_v is not None and not bus < p.brake_off_v < p.brake_on_v:
-        allowed = f"above [inverter] dc_bus_v = {bus:g} V, which keeps the resistor on, and below brake_on_v"
-        _refuse("[protection] brake_off_v", p.brake_off_v, f"{allowed} = {p.brake_on_v:g} V")
-
-
-def _watchdog_most(drive):
-    """Sample times without a sample in which the current rises by half its limit at rated speed.
-
-    The duties stand while the EMF turns on: L di/dt = psi omega (omega t), so i = psi omega**2 t**2 / (2 L).
-    """
-    m = drive.machine
-    omega, psi = m.pole_pairs * m.rated_speed_rad_s, m.magnet_flux_wb
-    if psi <= 0.0:
-        return math.inf
-    inductance, rise = min(m.inductance_d_h, m.inductance_q_h), (HURTS - 1.0) * drive.current_limit_a
-    return max(LEAST_WATCHDOG, math.sqrt(2.0 * inductance * rise / psi) / omega / drive.sample_time_s)
-
-
-def _bootstrap(drive):
-    """The lower switches short the motor while the bootstraps charge: a rotor that turns drives a current."""
-    m, given = drive.machine, drive.inverter.bootstrap_charge_s
-    omega = m.pole_pairs * m.rated_speed_rad_s
-    emf, inductance = omega * m.magnet_flux_wb, min(m.inductance_d_h, m.inductance_q_h)
-    steady = emf / math.hypot(m.resistance_ohm, omega * inductance)
-    limit = HURTS * drive.current_limit_a
-    if given <= 0.0 or steady <= limit:
-        return
-    most = limit * inductance / emf
-    if given > most:
-        allowed = f"up to {most:.3g} s: the lower switches short the motor, whose EMF at rated speed drives the current"
-        _refuse("[inverter] bootstrap_charge_s", given, f"{allowed} to {limit:g} A, {HURTS:g} times its limit")
+        refuse("[control] winding_temp_min_c", control.winding_temp_min_c, "below winding_temp_max_c")
 
 
 def _residual(drive):
@@ -364,27 +284,8 @@ def _residual(drive):
         raise DriveError("[core] residual = true needs estimators = true")
 
 
-def _regeneration(drive):
-    """As the bus rises: the chopper first, then the line that limits the braking current, the trip last."""
-    p, bus = drive.protection, drive.inverter.dc_bus_v
-    if p.regen_start_v is None:
-        if p.regen_end_v is not None:
-            raise DriveError(
-                "[protection] regen_end_v needs regen_start_v, where the limit of the braking current begins"
-            )
-        return
-    key, least = ("brake_on_v", p.brake_on_v) if p.brake_on_v is not None else ("[inverter] dc_bus_v", bus)
-    most = p.u_dc_max_v or default_u_dc_max_v(drive)
-    if not least < p.regen_start_v < most:
-        allowed = f"above {key} = {least:g} V and below u_dc_max_v = {most:g} V, which trips"
-        _refuse("[protection] regen_start_v", p.regen_start_v, allowed)
-    if not p.regen_start_v < regen_end_v(drive) < most:
-        allowed = f"above regen_start_v = {p.regen_start_v:g} V and below u_dc_max_v = {most:g} V, which trips"
-        _refuse("[protection] regen_end_v", p.regen_end_v, allowed)
-
-
 RULES = (
     _sample_time, _sampling, _carrier, _pulses, _low_side, _overmodulation, _position_pairs, _samples_per_turn,
     _voltage, _current, _flux, _codes, _trip_filter, _speed_loop, _current_loop, _flux_loop, _adaline_steps,
-    _protection, _bootstrap, _regeneration, _residual, check_encoder, check_converters, check_position,
+    check_levels, check_bootstrap, check_regeneration, _residual, check_encoder, check_converters, check_position,
 )  # fmt: skip

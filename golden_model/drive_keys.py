@@ -55,6 +55,11 @@ class DriveError(ValueError):
     """An invalid drive description; the message is one line for its author."""
 
 
+def refuse(key, value, allowed):
+    """DriveError for a value that contradicts others; ``allowed``: in words."""
+    raise DriveError(f"{key} = {value:g} is out of range: allowed is {allowed}")
+
+
 @dataclass(frozen=True)
 class Key:
     """Type and legal range of one key, both ends included; ``least``: smaller magnitudes between them are excluded."""

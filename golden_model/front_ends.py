@@ -7,7 +7,7 @@ The front ends of docs/board.md are set from these keys; without a section the c
 import math
 from dataclasses import dataclass
 
-from golden_model.drive_keys import DriveError, choice, flag, not_negative, positive, whole
+from golden_model.drive_keys import DriveError, choice, flag, not_negative, positive, refuse, whole
 
 # kind -> (keys it needs, keys it may have besides)
 ENCODERS = {
@@ -81,20 +81,20 @@ def check_encoder(drive):
     e, bits = drive.encoder, drive.sensors.position_bits
     _belong("encoder", e, ENCODERS)
     if e.counts is not None and e.counts > 1 << bits:
-        _refuse("[encoder] counts", e.counts, f"up to {1 << bits}, codes of [sensors] position_bits = {bits}")
+        refuse("[encoder] counts", e.counts, f"up to {1 << bits}, codes of [sensors] position_bits = {bits}")
     if e.kind == "abz" and e.filter_s:
         # Two counts lie between two edges of one channel; a filter of half that time still lets every level through.
         edge_s = 6.283185307179586 / drive.machine.rated_speed_rad_s * 2.0 / e.counts
         if not e.filter_s < edge_s / 2.0:
             allowed = f"below {edge_s / 2.0:.4g} s, half the time between two edges of a channel at rated speed"
-            _refuse("[encoder] filter_s", e.filter_s, allowed)
+            refuse("[encoder] filter_s", e.filter_s, allowed)
     if e.kind in ("ssi", "biss", "endat"):
         waits = 0.0 if e.kind == "ssi" else e.start_s
         if not frame_s(drive) < drive.sample_time_s:
             left = drive.sample_time_s - waits - pause_s(drive)
             least = (frame_s(drive) - waits) * e.clock_hz / left if left > 0.0 else float("inf")
             allowed = f"above {least:.6g} Hz: a frame and a pause of {pause_s(drive):g} s must end within a PWM period"
-            _refuse("[encoder] clock_hz", e.clock_hz, allowed)
+            refuse("[encoder] clock_hz", e.clock_hz, allowed)
         rest, wanted = drive.sample_time_s - frame_s(drive), pause_s(drive)
         if rest < wanted:
             given = "" if e.pause_s is not None else f", ordinary for {e.kind},"
@@ -105,7 +105,7 @@ def check_encoder(drive):
                 "or a slower PWM"
             )
         if not e.clock_hz <= drive.core.clock_hz / 4.0:
-            _refuse("[encoder] clock_hz", e.clock_hz, f"up to {drive.core.clock_hz / 4.0:g} Hz, a quarter of clock_hz")
+            refuse("[encoder] clock_hz", e.clock_hz, f"up to {drive.core.clock_hz / 4.0:g} Hz, a quarter of clock_hz")
 
 
 def pause_s(drive):
@@ -133,16 +133,16 @@ def check_converters(drive):
             around = {min(max(n, lo), hi) for n in (math.floor(min(ratio, hi)), math.ceil(min(ratio, hi)))}
             nearest = " and ".join(f"{clock / n:.7g} Hz" for n in sorted(around, reverse=True))
             allowed = f"[core] clock_hz = {clock:g} Hz over a whole number from {lo} to {hi}; nearest: {nearest}"
-            _refuse("[converters] clock_hz", c.clock_hz, allowed)
+            refuse("[converters] clock_hz", c.clock_hz, allowed)
         least = drive.sensors.adc_bits + c.skip_bits
         if (c.bits or drive.sensors.adc_bits) < least:
             allowed = f"at least {least}, [sensors] adc_bits and skip_bits: the word must hold the code"
-            _refuse("[converters] bits", c.bits or drive.sensors.adc_bits, allowed)
+            refuse("[converters] bits", c.bits or drive.sensors.adc_bits, allowed)
     if c.kind == "delta_sigma":
         window_s, period_s = (3 * c.oversampling + 1) / c.clock_hz, drive.sample_time_s
         if not window_s <= period_s:
             allowed = f"up to {int((period_s * c.clock_hz - 1) / 3)}: the window must fit a PWM period"
-            _refuse("[converters] oversampling", c.oversampling, allowed)
+            refuse("[converters] oversampling", c.oversampling, allowed)
 
 
 def _belong(section, given, kinds):
@@ -157,7 +157,3 @@ def _belong(section, given, kinds):
             may = ", ".join((*needed, *optional)) or "no further key"
             allowed = f'a key of another kind; kind = "{given.kind}" takes {may}'
             raise DriveError(f"[{section}] {key} = {getattr(given, key)} is {allowed}")
-
-
-def _refuse(key, value, allowed):
-    raise DriveError(f"{key} = {value:g} is out of range: allowed is {allowed}")

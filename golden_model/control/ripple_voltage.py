@@ -12,24 +12,21 @@ Formats: both steps as rotate, rounded half up to PU.  |rip| < 1/4 and factors b
 """
 
 from golden_model.block import Block, Port
-from golden_model.common.sum_of_products import difference_of_products, sum_of_products
 from golden_model.fixed import Format
-from golden_model.formats import PU, PU_W, TRIG
+from golden_model.formats import PU, TRIG
 from golden_model.kernel import kernel
 from golden_model.transforms import park
 from golden_model.transforms.rotate import TRIG_PORTS, on_circle
 
-DROP = PU.frac_bits
 RIPPLE = Format(1, -2, 23)  # flux linkage of the ripple, a quarter of its base at most
 RIP_LO, RIP_HI = -(1 << (PU.frac_bits - 2)), 1 << (PU.frac_bits - 2)
-assert DROP == TRIG.frac_bits
+assert PU.frac_bits == TRIG.frac_bits  # so the same rotation takes per-unit factors
 
 
 @kernel
 def step(rip_alpha, rip_beta, cos_theta, sin_theta, omega_me, k_ripple):
     rip_d, rip_q = park.step(rip_alpha, rip_beta, cos_theta, sin_theta)
-    u_rip_d = sum_of_products(rip_q, omega_me, rip_d, k_ripple, DROP, PU_W)
-    u_rip_q = difference_of_products(rip_d, omega_me, rip_q, k_ripple, DROP, PU_W)
+    u_rip_d, u_rip_q = park.step(rip_d, rip_q, k_ripple, omega_me)  # a rotation with these for cosine and sine
     return u_rip_d, u_rip_q
 
 
@@ -74,7 +71,6 @@ BLOCK = Block(
     ),
     latency=10,
     interval=9,
-    constants={"DROP": DROP},
     reference=reference,
     bound=bound,
     stimuli=stimuli,

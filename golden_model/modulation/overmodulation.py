@@ -17,6 +17,8 @@ product exact; table U(3,13) over m_square in steps of 2**-11; products with the
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from golden_model.block import Block, Port
 from golden_model.fixed import Format, clamp, round_half_up, saturate, saturate_u
 from golden_model.formats import PU, PU_W, U_MAX
@@ -121,7 +123,7 @@ def stimuli(rng, _config):
             "inverse_beta": inverse * 7 // 8,
             "u_max": min(round(65536 * 0.63605 * u_dc), U_MAX.hi),
         }
-        for part in (0.0, 0.5, 0.999, 1.0, 1.001, *np_range(1.0, 1.12, 60)):
+        for part in (0.0, 0.5, 0.999, 1.0, 1.001, *np.linspace(1.0, 1.12, 60).tolist()):
             size, angle = 65536 * part * u_dc / math.sqrt(3.0), rng.uniform(0.0, 2.0 * math.pi)
             d, q = round(size * math.cos(angle)), round(size * math.sin(angle))
             d = min(max(d, -U_MAX.hi), U_MAX.hi - 1)
@@ -131,11 +133,6 @@ def stimuli(rng, _config):
         {**ends, "u_max": u, "inverse": i, "inverse_beta": i} for u in (0, 1, U_MAX.hi) for i in (1, 131072, INVERSE.hi)
     ]
     return rows
-
-
-def np_range(low, high, count):
-    """``count`` numbers from low to high, both included."""
-    return [low + (high - low) * k / (count - 1) for k in range(count)]
 
 
 BLOCK = Block(

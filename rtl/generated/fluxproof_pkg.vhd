@@ -1014,7 +1014,6 @@ package fluxproof_pkg is
 
   -- ripple_voltage: none: docs/overmodulation.md
   constant RIPPLE_VOLTAGE_LATENCY : positive := 10;
-  constant RIPPLE_VOLTAGE_DROP : natural := 16;
 
   -- speed_pi: 001, section 5.3: speed regulator with limited current reference
   constant SPEED_PI_LATENCY : positive := 5;
