@@ -89,6 +89,7 @@ WRONG = {  # section, line, what the message must contain besides the file's nam
     "tiny pwm": ("core", "clock_hz = 1e12", "[core] clock_hz", "8 to 32767"),
     "dead time": ("inverter", "dead_time_s = 3e-6", "[inverter] dead_time_s", "below min_pulse_s = 3e-06 s"),
     "dead time in us": ("inverter", "dead_time_s = 300", "[inverter] dead_time_s = 300", "half a PWM period, 5e-05 s"),
+    "bootstrap": ("inverter", "bootstrap_charge_s = 1e-3", "[inverter] bootstrap_charge_s", "short the motor"),
     "no dead time": ("inverter", "dead_time_s = 0", "[inverter] dead_time_s = 0", "1e-12 up to 1000000 s"),
     "switch's pulse": (
         "inverter",
