@@ -8,8 +8,9 @@ import pytest
 
 from cocotb_tests.support.drives import PAPER
 from cocotb_tests.support.needs import skip_without_ghdl5
-from fluxproof.cosim.closed_loop import cosimulate, run_now
+from fluxproof.cosim.closed_loop import SAMPLE_DELAY, cosimulate, run_now
 from fluxproof.cosim.scenarios import SCENARIOS
+from fluxproof.cosim.sleeping import with_witness
 from fluxproof.cosim.verilated import VerilatedCore
 from fluxproof.cosim.verilated_device import VerilatedDevice
 from golden_model import drive as drives
@@ -74,6 +75,27 @@ def test_samples_at_the_minimum_interval():
         state, wanted = fluxproof.step(state, fluxproof.Sample(*map(int, sample)), values, config)
         got = core.get_many(fluxproof.Observed._fields)
         assert tuple(got.values()) == tuple(wanted)
+
+
+@pytest.mark.slow
+def test_nothing_changes_in_what_sleeps():
+    """A core with all that it can have: every register that stands between samples, at every clock of a run."""
+    skip_without_ghdl5()
+    parts = ("references", "position_loop", "residual", "modes", "overmodulation")
+    drive = drives.with_carrier(DRIVE, 500)
+    values, config = registers(drive)[:2]
+    config = config._replace(**dict.fromkeys(parts, 1))
+    core = VerilatedCore({name.upper(): value for name, value in config._asdict().items()}, rewrite=with_witness)
+    core.reset()
+    core.set_many({**values._asdict(), "enable": 1, "fault_ignore": NO_TRIP})
+    core.run_period(4 * config.carrier_half)
+    rng, ports = np.random.default_rng(1), sample_latch.BLOCK.ports({"ADC_BITS": 16, "POSITION_BITS": 16})
+    for period in range(150):
+        row = {p.name: int(rng.integers(p.low, p.high + 1)) for p in ports if p.name != "run_in"}
+        core.set_many({"position_mode": period // 25 % 2, "use_table": period // 50 % 2})
+        core.set("position_target", period << 14)
+        core.run_period(4 * config.carrier_half, sample=row, sample_at=SAMPLE_DELAY + 1)
+    assert core.get("running") and core.missed == 0
 
 
 KEPT = ("dead_time", "min_pulse", "flux_mode", "charge_samples")  # a charge of the bootstraps outlasts the run

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import re
 
-CORE = re.compile(r"fluxproof_\d\w*")  # the entity fluxproof, whose generics GHDL appends
+CORE = re.compile(r"fluxproof(_\d\w*)?")  # the entity fluxproof, whose generics GHDL appends
 PROTECTION, EVERY_CLOCK = "safety", ("charge", "gates", "guard", "host", "fault_memory")  # instances
 WAKE, MISSED, ASLEEP = "core_wakes", "core_missed", "clk_of_samples"
 STAYS = 64  # clocks; the registers in a row behind the last strobe are fewer, as the witness shows

@@ -86,7 +86,9 @@ begin
       end if;
 
       -- Stages 6 to 8: used, a sum of products;  stage 9: left = not used, narrowed
-      used <= resize(used + p, used'length);
+      if (valid(6) or valid(7)) = '1' then
+        used <= resize(used + p, used'length);
+      end if;
       if valid(5) = '1' then
         used  <= resize(not p, used'length);
         spare <= resize(shift_right(p, VOLTAGE_LOOP_DROP_E + 2), PU_W);

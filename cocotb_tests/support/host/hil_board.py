@@ -8,7 +8,6 @@ import math
 import numpy as np
 
 from cocotb_tests.support.host.rtl_board import RtlBoard
-from fluxproof.cosim.sleeping import with_sleep
 from fluxproof.hil.load import Word, load_words
 from fluxproof.plant import Bus, Inverter, Machine, Sensors
 from golden_model.formats import MOTOR_SPEED
@@ -23,7 +22,6 @@ class HilBoard(RtlBoard):
     """``machine``, ``inverter``, ``sensors``: of the motor, and its ``bus``, loaded at the start."""
 
     top = "fluxproof_hil"
-    rewrite = staticmethod(with_sleep)
 
     def __init__(self, drive, machine: Machine, inverter: Inverter, sensors: Sensors, bus: Bus):
         super().__init__(drive)

@@ -3,10 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from cocotb_tests.support.host.piped_board import Board
 from fluxproof.cosim.closed_loop import SAMPLE_DELAY
+from fluxproof.cosim.sleeping import with_sleep
 from fluxproof.cosim.verilated import VerilatedCore
 from golden_model.registers import registers
 
@@ -17,13 +16,12 @@ class RtlBoard(Board):
     """From the end of aresetn.  An access takes its clocks out of the period in which it falls."""
 
     top = "fluxproof_axi"
-    rewrite: Callable[[str], str] | None = None  # of verilator.build
 
     def __init__(self, drive, trip_at: float | None = None):
         super().__init__(drive, trip_at)
         config = registers(drive).config
         generics = {**config._asdict(), "clock_hz": round(drive.core.clock_hz), "ring_rows": drive.core.ring_rows}
-        self.core = VerilatedCore({n.upper(): v for n, v in generics.items()}, top=self.top, rewrite=type(self).rewrite)
+        self.core = VerilatedCore({n.upper(): v for n, v in generics.items()}, top=self.top, rewrite=with_sleep)
         self.core.set_many({"m_axis_tready": 1, "s_axi_wstrb": 15, "s_axi_bready": 1, "s_axi_rready": 1})
         self.core.reset()
         self.clock_s = 1.0 / drive.core.clock_hz
