@@ -77,6 +77,7 @@ def test_a_linear_machine_obeys_the_stator_equation_in_its_recording(kind):
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
+@pytest.mark.slow
 def test_power_balance_closes(kind):
     """With all physics of the machine: terminals = copper + core and short + shaft + field, to a ten-thousandth."""
     real, rng = _real(kind), np.random.default_rng(4)

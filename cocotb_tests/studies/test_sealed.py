@@ -90,6 +90,7 @@ def test_mean_voltages_obey_the_stator_equation(kind, faults):
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
+@pytest.mark.slow
 def test_energy_is_kept(kind):
     """Between two equal states, what enters the terminals is heat and shaft work, with all physics of the machine."""
     faults = (*IRON, "iron_loss", "phase_resistance_asymmetry")

@@ -115,6 +115,7 @@ def folder(tmp_path):
     return out
 
 
+@pytest.mark.slow
 def test_a_case_under_variations(folder):
     """Neither the prior nor the threshold of a name changes a resistance that is wrong by a third."""
     case, out = answers_of(("own/case_0001", folder, ["PRESENT", "HALF"]))
