@@ -6,6 +6,7 @@ from __future__ import annotations
 import base64
 import io
 import re
+import threading
 import time
 from collections import namedtuple
 from types import SimpleNamespace
@@ -26,7 +27,7 @@ from golden_model.fluxproof import Observed
 from golden_model.registers import registers
 from golden_model.units import from_si, to_si
 from studies.demo import __main__ as demo
-from studies.demo import concealed, plots, report
+from studies.demo import concealed, lanes, plots, report
 from studies.demo.example import in_the_loop
 
 
@@ -172,7 +173,7 @@ def test_progress_lines():
     kind = namedtuple("Job", "name total begun starts", defaults=["building"])
     loop, replay = kind("Fig. 9", 3000, True), kind("recording", 14595, True)
     waiting = kind("recording in GHDL", 300, False)
-    plain = demo.Progress([loop, replay, waiting], io.StringIO())
+    plain = lanes.Progress([loop, replay, waiting], io.StringIO())
     plain.show({loop: 0, replay: 0, waiting: 0}, 0.0)
     plain.show({loop: 60, replay: 290, waiting: 0}, 1.0)
     plain.show({loop: 360, replay: 300, waiting: 0}, 11.0)
@@ -192,7 +193,7 @@ def test_the_preparation_says_what_it_does():
         "Fig. 9 in Verilator", demo.Named("fluxproof.cosim.runs:closed_loop", (str(PAPER), 100, "short"))
     )
     steps = [demo.kernels("golden"), demo.kernels("plant"), job.build, demo.InGhdl.analyse]
-    assert {demo.step_name(step) for step in steps} == set(demo.PREPARED)
+    assert {lanes.step_name(step) for step in steps} == set(lanes.PREPARED)
 
     def wait() -> None:
         for _ in range(100):
@@ -203,8 +204,29 @@ def test_the_preparation_says_what_it_does():
             out.write("nothing was said in a second")
 
     wait.__name__ = "kernels of the golden"
-    demo.watch([demo.Lane(wait)], [], out, pause=0.01)
+    lanes.watch([lanes.Lane(lanes.Plan([(wait, ())]))], [], out, pause=0.01)
     assert out.getvalue() == "compiling the golden model; up to some minutes the first time\n"
+
+
+def test_a_step_waits_for_those_before_it_and_for_no_other():
+    """Two lanes; a step that fails holds up none that comes after it."""
+    began, go_on = [], threading.Event()
+
+    def slow():
+        began.append("slow")
+        assert go_on.wait(10.0)
+
+    def quick():
+        began.append("quick")
+        go_on.set()
+        raise SystemExit  # ends its lane
+
+    def last():
+        began.append("last")
+
+    plan = lanes.Plan([(slow, ()), (quick, ()), (last, (slow, quick))])
+    lanes.watch([lanes.Lane(plan), lanes.Lane(plan)], [], io.StringIO(), pause=0.01)
+    assert sorted(began[:2]) == ["quick", "slow"] and began[2:] == ["last"]
 
 
 @pytest.fixture

@@ -11,21 +11,19 @@ hidden difference named, 1 where anything differs or fails.
 from __future__ import annotations
 
 import argparse
-import os
 import sys
-import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
 from fluxproof.checkout import BUILD, DRIVES, ROOT
 from fluxproof.cosim import recording as recordings
-from fluxproof.cosim.runs import InGhdl, InVerilator, Job, Named, kernels
+from fluxproof.cosim.runs import InGhdl, InVerilator, Named, kernels
 from fluxproof.files import write_json
 from golden_model import drive as drives
 from studies.demo import concealed, plots, report
 from studies.demo.example import Diagnosis, run_length
+from studies.demo.lanes import Lane, Plan, watch
 
 DEMO = BUILD / "demo"
 PAPER, EMRAX = DRIVES / "paper001.toml", DRIVES / "emrax228.toml"
@@ -35,105 +33,6 @@ PAPER, EMRAX = DRIVES / "paper001.toml", DRIVES / "emrax228.toml"
 CARRIER = 100
 GHDL_PERIODS, GHDL_ROWS = 150, 200
 LEAST_PERIODS, LEAST_GHDL_PERIODS = 3000, 150
-# What comes before the first period, by the names of the steps.
-PREPARED = {
-    "kernels of the golden": "compiling the golden model",
-    "kernels of the plant": "compiling the plant",
-    "Fig. 9 in Verilator, build": "converting the VHDL to Verilog and building it",
-    "analyse": "building the VHDL in GHDL",
-}
-
-
-class Lane(threading.Thread):
-    """Steps one after the other, beside those of the other lanes."""
-
-    def __init__(self, *steps: Callable[[], object]):
-        super().__init__(daemon=True)
-        self.steps = steps
-        self.seconds: list[tuple[str, float]] = []  # what each step took
-        self.now = ""  # the step that runs
-
-    def run(self) -> None:
-        for step in self.steps:
-            began, self.now = time.monotonic(), step_name(step)
-            step()
-            self.seconds.append((step_name(step), round(time.monotonic() - began, 1)))
-
-
-def step_name(step: Callable[[], object]) -> str:
-    """What a lane's step does, for summary.json."""
-    job = getattr(step, "__self__", None)
-    return f"{job.name}, {step.__name__}" if hasattr(job, "name") else step.__name__
-
-
-class Progress:
-    """How far the jobs are: a live line on a terminal, else a line from each at every 10 %."""
-
-    def __init__(self, jobs: list[Job], out):
-        self.jobs, self.out = jobs, out
-        self.began: dict[Job, tuple[float, int]] = {}
-        self.shown: dict[Job, int] = {}
-        self.prepared: set[str] = set()
-
-    def prepare(self, lanes: list[Lane]) -> None:
-        """A line at the begin of each step that is no job, which may take minutes where nothing is compiled yet."""
-        for name in (lane.now for lane in lanes):
-            if name in PREPARED and name not in self.prepared:
-                self.prepared.add(name)
-                print(f"{PREPARED[name]}; up to some minutes the first time", file=self.out, flush=True)
-
-    def show(self, done: dict[Job, int], now: float) -> None:
-        for s in self.jobs:
-            if done[s]:
-                self.began.setdefault(s, (now, done[s]))
-        if self.out.isatty():
-            columns = os.get_terminal_size(self.out.fileno()).columns
-            print(f"\r{self.line(done, now, columns - 1)}\x1b[K", end="", file=self.out, flush=True)
-            return
-        for s in self.jobs:
-            tenth = 10 * done[s] // s.total
-            if s not in self.shown and s.begun:
-                self.shown[s] = 0
-                print(f"{s.name}: {s.starts}", file=self.out, flush=True)
-            if tenth > self.shown.get(s, 0):
-                self.shown[s] = tenth
-                if s.total == 1:  # done in one piece: no rate to show
-                    print(f"{s.name}: done", file=self.out, flush=True)
-                    continue
-                rate, left = self.speed(s, done[s], now)
-                state = f"{s.name}: {10 * tenth} %, {done[s]} of {s.total} periods"
-                print(f"{state}, {rate:.0f}/s, {left:.0f} s left", file=self.out, flush=True)
-
-    def speed(self, s: Job, done: int, now: float) -> tuple[float, float]:
-        """(periods per second, seconds left) since the first sign of life."""
-        since, first = self.began.get(s, (now, done))
-        rate = (done - first) / (now - since) if now > since else 0.0
-        return rate, (s.total - done) / rate if rate else 0.0
-
-    def line(self, done: dict[Job, int], now: float, columns: int) -> str:
-        """What runs now, in one line of at most ``columns`` characters."""
-        parts, width = [], min(20, max(4, (columns - 97) // 2))
-        running = [s for s in self.jobs if s.begun and done[s] < s.total]
-        for s in running:
-            bar = "#" * (width * done[s] // s.total)
-            text = f"[{bar:.<{width}}] {done[s]}/{s.total} {self.speed(s, done[s], now)[0]:.0f}/s"
-            parts.append(f"{s.name} {text if done[s] else s.starts}")
-        left = max([self.speed(s, done[s], now)[1] for s in running], default=0)
-        return "  ".join([*parts, f"{left:.0f} s left" if left else ""])[:columns]
-
-
-def watch(lanes: list[Lane], jobs: list[Job], out=sys.stdout, pause: float = 0.5) -> None:
-    """Run the lanes side by side and show how far their jobs are."""
-    progress = Progress(jobs, out)
-    for lane in lanes:
-        lane.start()
-    while any([lane.is_alive() for lane in lanes]):
-        progress.prepare(lanes)
-        progress.show({job: job.done() for job in jobs}, time.monotonic())
-        time.sleep(pause)
-    progress.show({job: job.done() for job in jobs}, time.monotonic())
-    if out.isatty():
-        print(file=out)
 
 
 def both(name: str, function: str, verilator: tuple, ghdl: tuple) -> SimpleNamespace:
@@ -161,6 +60,18 @@ def prepare(carrier_half: int, ghdl_periods: int):
     function, log = "fluxproof.cosim.recording:replay", (str(path), str(EMRAX), CARRIER)
     replay = both("recording", function, log, (*log, GHDL_ROWS))
     return loop, replay, recordings.load_recording(path), None
+
+
+def plan_of(loop: SimpleNamespace, replay: SimpleNamespace | None, driven: InVerilator, diagnosis: Diagnosis) -> Plan:
+    """What is compiled for all runs, then the runs, the longest first; the diagnosis needs the example's telemetry."""
+    golden, plant, analyse = kernels("golden"), kernels("plant"), InGhdl.analyse
+    compiled = (golden, plant)
+    runs = [r for r in (loop, replay) if r]
+    steps = [(golden, ()), (loop.verilator.build, ()), (plant, ())]
+    steps += [(loop.verilator.carry_out, (*compiled, loop.verilator.build)), (driven.carry_out, compiled)]
+    steps += [(diagnosis.carry_out, (driven.carry_out,)), (analyse, ())]
+    steps += [(r.verilator.carry_out, compiled) for r in runs[1:]]
+    return Plan(steps + [(r.ghdl.carry_out, (*compiled, analyse)) for r in runs])
 
 
 def counted(runs: SimpleNamespace) -> dict:
@@ -231,11 +142,8 @@ def main(argv: list[str] | None = None) -> int:
     runs = [r for r in (loop, replay) if r]
     driven, diagnosis = diagnosed()
     jobs = [*(job for r in runs for job in (r.verilator, r.ghdl)), driven, diagnosis]
-    # Fig. 9 in Verilator takes the longest; the other lane builds its library meanwhile, then runs nearly all the rest.
-    first = [loop.verilator, *([replay.verilator] if replay else [])]
-    second = [driven, diagnosis, loop.ghdl, *([replay.ghdl] if replay else [])]
-    lanes = [Lane(kernels("golden"), *(job.carry_out for job in first))]
-    lanes += [Lane(loop.verilator.build, kernels("plant"), InGhdl.analyse, *(job.carry_out for job in second))]
+    plan = plan_of(loop, replay, driven, diagnosis)
+    lanes = [Lane(plan), Lane(plan)]
     watch(lanes, jobs)
     problems = [f"{job.name}: {job.problem}" for job in jobs if job.problem]
     sys.stderr.writelines(f"{problem}\n" for problem in problems)
