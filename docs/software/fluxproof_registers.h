@@ -73,6 +73,11 @@ extern "C" {
 #define FLUXPROOF__OVERMODULATION__VALUE_bp 0
 #define FLUXPROOF__OVERMODULATION__VALUE_bw 32
 
+// reg - fluxproof::gearing
+#define FLUXPROOF__GEARING__VALUE_bm 0xffffffff
+#define FLUXPROOF__GEARING__VALUE_bp 0
+#define FLUXPROOF__GEARING__VALUE_bw 32
+
 // reg - fluxproof::enable
 #define FLUXPROOF__ENABLE__VALUE_bm 0x1
 #define FLUXPROOF__ENABLE__VALUE_bp 0
@@ -209,6 +214,12 @@ extern "C" {
 #define FLUXPROOF__FLAGS__REGEN_LIMITED_bm 0x10000
 #define FLUXPROOF__FLAGS__REGEN_LIMITED_bp 16
 #define FLUXPROOF__FLAGS__REGEN_LIMITED_bw 1
+#define FLUXPROOF__FLAGS__GEAR_ENGAGED_bm 0x20000
+#define FLUXPROOF__FLAGS__GEAR_ENGAGED_bp 17
+#define FLUXPROOF__FLAGS__GEAR_ENGAGED_bw 1
+#define FLUXPROOF__FLAGS__GEAR_STOPPED_bm 0x40000
+#define FLUXPROOF__FLAGS__GEAR_STOPPED_bp 18
+#define FLUXPROOF__FLAGS__GEAR_STOPPED_bw 1
 #define FLUXPROOF__FLAGS__MOTOR_DIFFERS_bm 0x1000000
 #define FLUXPROOF__FLAGS__MOTOR_DIFFERS_bp 24
 #define FLUXPROOF__FLAGS__MOTOR_DIFFERS_bw 1
@@ -1036,6 +1047,53 @@ extern "C" {
 #define FLUXPROOF__POSITION_ERROR__VALUE_bm 0xffffffff
 #define FLUXPROOF__POSITION_ERROR__VALUE_bp 0
 #define FLUXPROOF__POSITION_ERROR__VALUE_bw 32
+
+// reg - fluxproof::gear_way
+#define FLUXPROOF__GEAR_WAY__VALUE_bm 0xffffffff
+#define FLUXPROOF__GEAR_WAY__VALUE_bp 0
+#define FLUXPROOF__GEAR_WAY__VALUE_bw 32
+
+// reg - fluxproof::gear_on
+#define FLUXPROOF__GEAR_ON__VALUE_bm 0x1
+#define FLUXPROOF__GEAR_ON__VALUE_bp 0
+#define FLUXPROOF__GEAR_ON__VALUE_bw 1
+#define FLUXPROOF__GEAR_ON__VALUE_reset 0x0
+
+// reg - fluxproof::gear_numerator
+#define FLUXPROOF__GEAR_NUMERATOR__VALUE_bm 0xffffffff
+#define FLUXPROOF__GEAR_NUMERATOR__VALUE_bp 0
+#define FLUXPROOF__GEAR_NUMERATOR__VALUE_bw 32
+#define FLUXPROOF__GEAR_NUMERATOR__VALUE_reset 0x0
+
+// reg - fluxproof::gear_denominator
+#define FLUXPROOF__GEAR_DENOMINATOR__VALUE_bm 0xffff
+#define FLUXPROOF__GEAR_DENOMINATOR__VALUE_bp 0
+#define FLUXPROOF__GEAR_DENOMINATOR__VALUE_bw 16
+#define FLUXPROOF__GEAR_DENOMINATOR__VALUE_reset 0x1
+
+// reg - fluxproof::gear_step
+#define FLUXPROOF__GEAR_STEP__VALUE_bm 0x1ffffff
+#define FLUXPROOF__GEAR_STEP__VALUE_bp 0
+#define FLUXPROOF__GEAR_STEP__VALUE_bw 25
+#define FLUXPROOF__GEAR_STEP__VALUE_reset 0x1
+
+// reg - fluxproof::gear_lead
+#define FLUXPROOF__GEAR_LEAD__VALUE_bm 0x3ff
+#define FLUXPROOF__GEAR_LEAD__VALUE_bp 0
+#define FLUXPROOF__GEAR_LEAD__VALUE_bw 10
+#define FLUXPROOF__GEAR_LEAD__VALUE_reset 0x0
+
+// reg - fluxproof::gear_smooth
+#define FLUXPROOF__GEAR_SMOOTH__VALUE_bm 0xf
+#define FLUXPROOF__GEAR_SMOOTH__VALUE_bp 0
+#define FLUXPROOF__GEAR_SMOOTH__VALUE_bw 4
+#define FLUXPROOF__GEAR_SMOOTH__VALUE_reset 0x0
+
+// reg - fluxproof::gear_code
+#define FLUXPROOF__GEAR_CODE__VALUE_bm 0x3ffff
+#define FLUXPROOF__GEAR_CODE__VALUE_bp 0
+#define FLUXPROOF__GEAR_CODE__VALUE_bw 18
+#define FLUXPROOF__GEAR_CODE__VALUE_reset 0x0
 
 // reg - fluxproof::residual_min
 #define FLUXPROOF__RESIDUAL_MIN__VALUE_bm 0x1ffff
@@ -2063,7 +2121,8 @@ typedef struct {
     uint32_t residual;
     uint32_t modes;
     uint32_t overmodulation;
-    uint8_t RESERVED_30_3f[0x10];
+    uint32_t gearing;
+    uint8_t RESERVED_34_3f[0xc];
     uint32_t enable;
     uint32_t clear_trip;
     uint32_t clear_faults;
@@ -2229,7 +2288,15 @@ typedef struct {
     uint8_t RESERVED_2d8_2df[0x8];
     uint32_t shaft_position;
     uint32_t position_error;
-    uint8_t RESERVED_2e8_33f[0x58];
+    uint32_t gear_way;
+    uint32_t gear_on;
+    uint32_t gear_numerator;
+    uint32_t gear_denominator;
+    uint32_t gear_step;
+    uint32_t gear_lead;
+    uint32_t gear_smooth;
+    uint32_t gear_code;
+    uint8_t RESERVED_308_33f[0x38];
     uint32_t residual_min;
     uint32_t residual_w;
     uint32_t residual_i;

@@ -25,6 +25,7 @@ GENERICS = {
     "RESIDUAL": 0,
     "MODES": 0,
     "OVERMODULATION": 0,
+    "GEARING": 0,
 }  # as in the core
 BOARD_GENERICS = {"ENCODER": 1, "CURRENTS": 1, "SPI_LINES": 4}
 BETWEEN, AT_ONCE = ("setting", "sample pulse"), ("command", "pulse")

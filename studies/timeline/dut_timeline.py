@@ -23,7 +23,7 @@ CLOCKS = 80
 def instances(top: Path) -> dict[str, str]:
     """{label: entity} of everything the top, without what is off by default, and its protection instantiate."""
     text = re.sub(
-        r"(REFERENCES|POSITION_LOOP|RESIDUAL|MODES|OVERMODULATION) = 1 generate.*?else generate",
+        r"(REFERENCES|POSITION_LOOP|RESIDUAL|MODES|OVERMODULATION|GEARING) = 1 generate.*?else generate",
         "",
         top.read_text(),
         flags=re.DOTALL,
