@@ -9,14 +9,14 @@ from collections.abc import Iterator
 from fluxproof.checkout import BUILD
 from fluxproof.cosim.runs import InVerilator, Named
 from fluxproof.files import write_json
-from studies.position import figures, modes
+from studies.position import figures, gears, modes
 
 PERIODS, CARRIER_HALF = 3000, 128  # of the comparison with the RTL
 
 
 def rtl() -> Iterator[dict]:
-    """The RTL against the golden core in all modes, and through every change of a core with voltage mode."""
-    scenes = {"all modes": "drives:all_modes", "every change": "modes:every_change"}
+    """The RTL against the golden core in all modes, through every change of a core with voltage mode, and in gear."""
+    scenes = {"all modes": "drives:all_modes", "every change": "modes:every_change", "in gear": "gears:every_clutch"}
     for name, scene in scenes.items():
         run = Named(f"studies.position.{scene}", (CARRIER_HALF, PERIODS))
         job = InVerilator(f"position_{scene.partition(':')[2]}", run)
@@ -32,7 +32,8 @@ def main() -> int:
     """All figures; exit status 1 where one misses its target."""
     rows = []
     changes = (one for built in (True, False) for name in figures.CASES for one in modes.rows_of(name, built))
-    for found in (figures.all_figures(), changes, rtl()):
+    in_gear = (one for name in figures.CASES for one in gears.rows_of(name))
+    for found in (figures.all_figures(), changes, in_gear, rtl()):
         for one in found:
             rows.append(one)
             mark = "ok  " if one["pass"] else "MISS"
