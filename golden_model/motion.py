@@ -13,6 +13,7 @@ from golden_model.control import gear as gear_block
 from golden_model.control.position_control import POSITION
 from golden_model.control.position_plan import SECTION_BITS, WAY
 from golden_model.drive_keys import DriveError, not_negative, positive, real, whole
+from golden_model.encoders.turn_counter import COUNTS_MAX, COUNTS_MIN
 from golden_model.formats import PU
 from golden_model.protection_limits import OVERSPEED
 from golden_model.scale_entry import Entry, base_keys
@@ -47,6 +48,9 @@ class Position:
         -NUMERATOR.hi, NUMERATOR.hi, "turns of this shaft in gear_denominator turns of the master", None
     )
     gear_denominator: int = whole(1, DENOMINATOR.hi, "turns of the master", 1)
+    gear_master_counts: int | None = whole(
+        COUNTS_MIN, COUNTS_MAX, "counts a turn of a master at A/B pins of the board; none: gear_code", None
+    )
     gear_ramp_s: float = not_negative("s", "time in which the gear reaches its ratio", 0.1, most=1000.0)
     gear_lead_samples: int | None = whole(
         0, GEAR_LEAD.hi, "of the gear at the master's mean speed; the delay of the trajectory if none", None
@@ -71,6 +75,13 @@ def check_position(drive):
         raise DriveError("[core] gearing needs position_loop = true, which follows the gear")
     if p.gear_numerator is not None and not drive.core.gearing:
         raise DriveError("[position] gear_numerator is given and [core] gearing is not true: nothing would use it")
+    if p.gear_master_counts is not None:
+        if not drive.core.gearing:
+            raise DriveError(
+                "[position] gear_master_counts is given and [core] gearing is not true: nothing would use it"
+            )
+        if drive.encoder.kind == "code" and drive.converters.kind == "codes":
+            raise DriveError("[position] gear_master_counts needs a board: [encoder] or [converters] with a kind")
     if not p.gear_numerator and drive.core.gearing:
         found = "missing" if p.gear_numerator is None else "0"
         raise DriveError(f"[position] gear_numerator is {found}: [core] gearing needs the ratio of the gear")

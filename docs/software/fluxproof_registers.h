@@ -1281,6 +1281,11 @@ extern "C" {
 #define FLUXPROOF__SPI_LINES__VALUE_bp 0
 #define FLUXPROOF__SPI_LINES__VALUE_bw 32
 
+// reg - fluxproof::master
+#define FLUXPROOF__MASTER__VALUE_bm 0xffffffff
+#define FLUXPROOF__MASTER__VALUE_bp 0
+#define FLUXPROOF__MASTER__VALUE_bw 32
+
 // reg - fluxproof::clear_encoder
 #define FLUXPROOF__CLEAR_ENCODER__VALUE_bm 0x1
 #define FLUXPROOF__CLEAR_ENCODER__VALUE_bp 0
@@ -1416,6 +1421,11 @@ extern "C" {
 #define FLUXPROOF__SNAP_ADC_U_DC__VALUE_bm 0xffff
 #define FLUXPROOF__SNAP_ADC_U_DC__VALUE_bp 0
 #define FLUXPROOF__SNAP_ADC_U_DC__VALUE_bw 16
+
+// reg - fluxproof::master_illegal
+#define FLUXPROOF__MASTER_ILLEGAL__VALUE_bm 0xfff
+#define FLUXPROOF__MASTER_ILLEGAL__VALUE_bp 0
+#define FLUXPROOF__MASTER_ILLEGAL__VALUE_bw 12
 
 // reg - fluxproof::filter_clocks
 #define FLUXPROOF__FILTER_CLOCKS__VALUE_bm 0x3ff
@@ -1746,6 +1756,24 @@ extern "C" {
 #define FLUXPROOF__LIMIT_LOW__VALUE_bp 0
 #define FLUXPROOF__LIMIT_LOW__VALUE_bw 16
 #define FLUXPROOF__LIMIT_LOW__VALUE_reset 0x0
+
+// reg - fluxproof::master_counts
+#define FLUXPROOF__MASTER_COUNTS__VALUE_bm 0x7ffff
+#define FLUXPROOF__MASTER_COUNTS__VALUE_bp 0
+#define FLUXPROOF__MASTER_COUNTS__VALUE_bw 19
+#define FLUXPROOF__MASTER_COUNTS__VALUE_reset 0x0
+
+// reg - fluxproof::master_step
+#define FLUXPROOF__MASTER_STEP__VALUE_bm 0x1ffff
+#define FLUXPROOF__MASTER_STEP__VALUE_bp 0
+#define FLUXPROOF__MASTER_STEP__VALUE_bw 17
+#define FLUXPROOF__MASTER_STEP__VALUE_reset 0x0
+
+// reg - fluxproof::master_rest
+#define FLUXPROOF__MASTER_REST__VALUE_bm 0x3ffff
+#define FLUXPROOF__MASTER_REST__VALUE_bp 0
+#define FLUXPROOF__MASTER_REST__VALUE_bw 18
+#define FLUXPROOF__MASTER_REST__VALUE_reset 0x0
 
 // reg - fluxproof::motor_u_dc
 #define FLUXPROOF__MOTOR_U_DC__VALUE_bm 0xffffffff
@@ -2331,7 +2359,7 @@ typedef struct {
     uint32_t encoder;
     uint32_t currents;
     uint32_t spi_lines;
-    uint8_t RESERVED_40c_40f[0x4];
+    uint32_t master;
     uint32_t clear_encoder;
     uint32_t take_snapshot;
     uint32_t position_source;
@@ -2360,7 +2388,8 @@ typedef struct {
     uint32_t snap_adc_b;
     uint32_t snap_adc_c;
     uint32_t snap_adc_u_dc;
-    uint8_t RESERVED_494_4ff[0x6c];
+    uint32_t master_illegal;
+    uint8_t RESERVED_498_4ff[0x68];
     uint32_t filter_clocks;
     uint32_t index_phase;
     uint32_t counts;
@@ -2416,7 +2445,10 @@ typedef struct {
     uint32_t trip_oversampling;
     uint32_t limit_high;
     uint32_t limit_low;
-    uint8_t RESERVED_5dc_7ff[0x224];
+    uint32_t master_counts;
+    uint32_t master_step;
+    uint32_t master_rest;
+    uint8_t RESERVED_5e8_7ff[0x218];
     uint32_t motor_u_dc;
     uint32_t motor_load;
     uint32_t motor_start;

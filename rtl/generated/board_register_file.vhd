@@ -34,7 +34,8 @@ entity board_register_file is
     GEARING        : natural := 0;
     ENCODER        : natural := 1;
     CURRENTS       : natural := 1;
-    SPI_LINES      : natural := 4
+    SPI_LINES      : natural := 4;
+    MASTER         : natural := 0
   );
   port (
     clk               : in  std_logic;
@@ -142,6 +143,9 @@ entity board_register_file is
     trip_oversampling : out unsigned(5 downto 0);  -- 5d0 bits from total to total of the fast overcurrent
     limit_high        : out unsigned(15 downto 0);  -- 5d4 total that trips, and above
     limit_low         : out unsigned(15 downto 0);  -- 5d8 total that trips, and below
+    master_counts     : out unsigned(18 downto 0);  -- 5dc counts a turn of the master, four for each line
+    master_step       : out unsigned(16 downto 0);  -- 5e0 2**18 / master_counts, whole part
+    master_rest       : out unsigned(17 downto 0);  -- 5e4 2**18 / master_counts, remainder
     running           : in  std_logic;  -- 080 gates are switching
     tripped           : in  std_logic;  -- 080 1: a trip is latched
     setting_refused   : in  std_logic;  -- 080 1: dead_time and min_pulse contradict each other, refused
@@ -178,7 +182,8 @@ entity board_register_file is
     snap_adc_a        : in  unsigned(15 downto 0);  -- 484 snapshot: ADC code, a, right-aligned
     snap_adc_b        : in  unsigned(15 downto 0);  -- 488 snapshot: ADC code, b, right-aligned
     snap_adc_c        : in  unsigned(15 downto 0);  -- 48c snapshot: ADC code, c, right-aligned
-    snap_adc_u_dc     : in  unsigned(15 downto 0)  -- 490 snapshot: ADC code, u_dc, right-aligned
+    snap_adc_u_dc     : in  unsigned(15 downto 0);  -- 490 snapshot: ADC code, u_dc, right-aligned
+    master_illegal    : in  unsigned(11 downto 0)  -- 494 illegal transitions of the master's A and B, saturates
   );
 end entity board_register_file;
 
@@ -1162,6 +1167,18 @@ begin
         limit_low    <= unsigned(held(15 downto 0));
         written(374) <= '1';
       end if;
+      if (row(46) and column(7) and not sample_busy) = '1' then
+        master_counts <= unsigned(held(18 downto 0));
+        written(375)  <= '1';
+      end if;
+      if (row(47) and column(0) and not sample_busy) = '1' then
+        master_step  <= unsigned(held(16 downto 0));
+        written(376) <= '1';
+      end if;
+      if (row(47) and column(1) and not sample_busy) = '1' then
+        master_rest  <= unsigned(held(17 downto 0));
+        written(377) <= '1';
+      end if;
 
       if rst = '1' then
         written                   <= (others => '0');
@@ -1379,6 +1396,9 @@ begin
         trip_oversampling         <= to_unsigned(8, 6);
         limit_high                <= (others => '0');
         limit_low                 <= (others => '0');
+        master_counts             <= (others => '0');
+        master_step               <= (others => '0');
+        master_rest               <= (others => '0');
       end if;
     end if;
   end process;
@@ -1603,7 +1623,7 @@ begin
   shown(256)        <= std_logic_vector(to_unsigned(ENCODER, 32));
   shown(257)        <= std_logic_vector(to_unsigned(CURRENTS, 32));
   shown(258)        <= std_logic_vector(to_unsigned(SPI_LINES, 32));
-  shown(259 to 259) <= (others => (others => '0'));
+  shown(259)        <= std_logic_vector(to_unsigned(MASTER, 32));
   shown(260)        <= "0000000000000000000000000000000" & clear_encoder;
   shown(261)        <= "0000000000000000000000000000000" & take_snapshot;
   shown(262 to 271) <= (others => (others => '0'));
@@ -1628,7 +1648,8 @@ begin
   shown(290)        <= std_logic_vector(resize(snap_adc_b, 32));
   shown(291)        <= std_logic_vector(resize(snap_adc_c, 32));
   shown(292)        <= std_logic_vector(resize(snap_adc_u_dc, 32));
-  shown(293 to 358) <= (others => (others => '0'));
+  shown(293)        <= std_logic_vector(resize(master_illegal, 32));
+  shown(294 to 358) <= (others => (others => '0'));
   shown(359)        <= x"00000001";
   shown(360)        <= x"00000001";
   shown(361 to 365) <= (others => (others => '0'));

@@ -1148,6 +1148,9 @@ package fluxproof_pkg is
   constant LINE_TIMER_LATENCY : positive := 1;
   constant LINE_TIMER_SPAN_MORE : natural := 2;
 
+  -- master_encoder: none: incremental encoder
+  constant MASTER_ENCODER_LATENCY : positive := 1;
+
   -- position_bridge: none: absolute encoders
   constant POSITION_BRIDGE_LATENCY : positive := 1;
   constant POSITION_BRIDGE_DROP : natural := 16;

@@ -34,7 +34,8 @@ entity hil_register_file is
     GEARING        : natural := 0;
     ENCODER        : natural := 1;
     CURRENTS       : natural := 1;
-    SPI_LINES      : natural := 4
+    SPI_LINES      : natural := 4;
+    MASTER         : natural := 0
   );
   port (
     clk                 : in  std_logic;
@@ -142,6 +143,9 @@ entity hil_register_file is
     trip_oversampling   : out unsigned(5 downto 0);  -- 5d0 bits from total to total of the fast overcurrent
     limit_high          : out unsigned(15 downto 0);  -- 5d4 total that trips, and above
     limit_low           : out unsigned(15 downto 0);  -- 5d8 total that trips, and below
+    master_counts       : out unsigned(18 downto 0);  -- 5dc counts a turn of the master, four for each line
+    master_step         : out unsigned(16 downto 0);  -- 5e0 2**18 / master_counts, whole part
+    master_rest         : out unsigned(17 downto 0);  -- 5e4 2**18 / master_counts, remainder
     motor_u_dc          : out signed(23 downto 0);  -- 800 voltage of the source; without a capacitor that of the bus
     motor_load          : out signed(24 downto 0);  -- 804 load torque
     motor_start         : out std_logic;  -- 808 1: the rotor is held at the angle zero, with the flux motor_psi_start
@@ -229,6 +233,7 @@ entity hil_register_file is
     snap_adc_b          : in  unsigned(15 downto 0);  -- 488 snapshot: ADC code, b, right-aligned
     snap_adc_c          : in  unsigned(15 downto 0);  -- 48c snapshot: ADC code, c, right-aligned
     snap_adc_u_dc       : in  unsigned(15 downto 0);  -- 490 snapshot: ADC code, u_dc, right-aligned
+    master_illegal      : in  unsigned(11 downto 0);  -- 494 illegal transitions of the master's A and B, saturates
     motor_i_a           : in  signed(17 downto 0);  -- 900 current of phase a
     motor_i_b           : in  signed(17 downto 0);  -- 904 current of phase b
     motor_i_c           : in  signed(17 downto 0);  -- 908 current of phase c
@@ -1226,6 +1231,18 @@ begin
         limit_low    <= unsigned(held(15 downto 0));
         written(374) <= '1';
       end if;
+      if (row(46) and column(7) and not sample_busy) = '1' then
+        master_counts <= unsigned(held(18 downto 0));
+        written(375)  <= '1';
+      end if;
+      if (row(47) and column(0) and not sample_busy) = '1' then
+        master_step  <= unsigned(held(16 downto 0));
+        written(376) <= '1';
+      end if;
+      if (row(47) and column(1) and not sample_busy) = '1' then
+        master_rest  <= unsigned(held(17 downto 0));
+        written(377) <= '1';
+      end if;
       if (row(64) and column(0)) = '1' then
         motor_u_dc   <= signed(held(23 downto 0));
         written(512) <= '1';
@@ -1641,6 +1658,9 @@ begin
         trip_oversampling         <= to_unsigned(8, 6);
         limit_high                <= (others => '0');
         limit_low                 <= (others => '0');
+        master_counts             <= (others => '0');
+        master_step               <= (others => '0');
+        master_rest               <= (others => '0');
         motor_u_dc                <= (others => '0');
         motor_load                <= (others => '0');
         motor_start               <= '0';
@@ -1915,7 +1935,7 @@ begin
   shown(256)         <= std_logic_vector(to_unsigned(ENCODER, 32));
   shown(257)         <= std_logic_vector(to_unsigned(CURRENTS, 32));
   shown(258)         <= std_logic_vector(to_unsigned(SPI_LINES, 32));
-  shown(259 to 259)  <= (others => (others => '0'));
+  shown(259)         <= std_logic_vector(to_unsigned(MASTER, 32));
   shown(260)         <= "0000000000000000000000000000000" & clear_encoder;
   shown(261)         <= "0000000000000000000000000000000" & take_snapshot;
   shown(262 to 271)  <= (others => (others => '0'));
@@ -1940,7 +1960,8 @@ begin
   shown(290)         <= std_logic_vector(resize(snap_adc_b, 32));
   shown(291)         <= std_logic_vector(resize(snap_adc_c, 32));
   shown(292)         <= std_logic_vector(resize(snap_adc_u_dc, 32));
-  shown(293 to 358)  <= (others => (others => '0'));
+  shown(293)         <= std_logic_vector(resize(master_illegal, 32));
+  shown(294 to 358)  <= (others => (others => '0'));
   shown(359)         <= x"00000001";
   shown(360)         <= x"00000001";
   shown(361 to 365)  <= (others => (others => '0'));

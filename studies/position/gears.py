@@ -20,7 +20,7 @@ from golden_model.formats import TURN_W
 from golden_model.motion import count_turns, gear_ratio, limits, to_position
 from golden_model.registers import registers
 from golden_model.units import TURN_RAD, to_si
-from studies.position import figures
+from studies.position import figures, modes
 from studies.position.drives import moves, positioned
 
 COARSE = 4000  # counts a turn of the master
@@ -113,17 +113,20 @@ def following(name: str, drive, what: str, target: float, counts: int | None = N
 
 
 def clutch(name: str, drive) -> dict:
-    """The gear engages at a master that turns at half speed: the step of the voltage over the largest of motion."""
-    speed, on = master_speed(drive), 0.4
-    turns = turning(drive, 1.0, {0.0: speed})
+    """The gear engages at a master that turns at half speed: the largest step of the voltage, of the circle.
+
+    Without the compensation of the dead time, as in modes.
+    """
+    on = 0.4
+    turns = turning(drive, 1.0, {0.0: master_speed(drive)})
     run = play(drive, moves(drive, 1.0, {}, {on: {"gear_on": 1}}), turns)
-    u = np.hypot(*(np.diff(to_si(f"u_{x}", np.asarray(run.observed[f"u_{x}"]), drive)) for x in "dq"))
     k, ramp = round(on / drive.sample_time_s), round(RAMP_S / drive.sample_time_s)
-    usual = float(u[k + 3 * ramp :].max())
-    assert run.observed["gear_engaged"][-1] and not run.observed["gear_engaged"][k]
-    step = float(u[k : k + ramp].max())
-    what = "step of the voltage while it engages at half speed, over the largest behind it"
-    return figures.row(f"{name}, gear", what, step / usual, 1.5, "1")
+    assert run.observed["gear_engaged"][k + ramp + 1] and not run.observed["gear_engaged"][k + ramp - 2]
+    motor = {x: run.observed[f"u_{x}"] - run.observed[f"u_comp_{x}"] for x in "dq"}
+    u = np.hypot(*(np.diff(to_si(f"u_{x}", np.asarray(of), drive)) for x, of in motor.items()))
+    step = float(u[k : k + ramp].max()) * math.sqrt(3.0) / drive.inverter.dc_bus_v
+    what = "step of the voltage while it engages at half speed, of the circle"
+    return figures.row(f"{name}, gear", what, step, modes.TARGET, "1")
 
 
 def at_a_stop(name: str) -> Iterator[dict]:
