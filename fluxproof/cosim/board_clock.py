@@ -333,7 +333,7 @@ class BoardClock:
     def __init__(self, blocks: GoldenBlocks, clock_hz: int):
         self.blocks, self.clock_hz, core = blocks, clock_hz, blocks.core
         generics = {**core._asdict(), "clock_hz": clock_hz}
-        self.registers = RegisterFile(generics)
+        self.registers = RegisterFile(generics, beside={"master": blocks.master})
         self.registers.map = board_map.registers()
         self.registers.at = {register.address: register for register in self.registers.map.values()}
         self.registers.reset()

@@ -82,7 +82,10 @@ def board_registers() -> list[Register]:
     for name, address in named.items():
         port = given[name]
         reset = max(port.low, min(port.high, 0))
-        found.append(Register(name, address, kinds.get(name, Kind.SETTING), (Field(name, port),), port.doc, reset))
+        needs = "master" if name.startswith("master_") else ""
+        found.append(
+            Register(name, address, kinds.get(name, Kind.SETTING), (Field(name, port),), port.doc, reset, needs)
+        )
     found += [
         Register(name, address, Kind.STATUS, (Field(name, shown[name]),), shown[name].doc)
         for name, address in STATUS.items()

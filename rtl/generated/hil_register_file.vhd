@@ -1231,15 +1231,15 @@ begin
         limit_low    <= unsigned(held(15 downto 0));
         written(374) <= '1';
       end if;
-      if (row(46) and column(7) and not sample_busy) = '1' then
+      if MASTER = 1 and (row(46) and column(7) and not sample_busy) = '1' then
         master_counts <= unsigned(held(18 downto 0));
         written(375)  <= '1';
       end if;
-      if (row(47) and column(0) and not sample_busy) = '1' then
+      if MASTER = 1 and (row(47) and column(0) and not sample_busy) = '1' then
         master_step  <= unsigned(held(16 downto 0));
         written(376) <= '1';
       end if;
-      if (row(47) and column(1) and not sample_busy) = '1' then
+      if MASTER = 1 and (row(47) and column(1) and not sample_busy) = '1' then
         master_rest  <= unsigned(held(17 downto 0));
         written(377) <= '1';
       end if;

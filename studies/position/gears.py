@@ -112,7 +112,7 @@ def following(name: str, drive, what: str, target: float, counts: int | None = N
     yield figures.row(head, "at rest after reversals", largest(later, 2.7, 2.8), target, "counts")
 
 
-def clutch(name: str, drive) -> dict:
+def clutch(name: str, drive) -> Iterator[dict]:
     """The gear engages at a master that turns at half speed: the largest step of the voltage, of the circle.
 
     Without the compensation of the dead time, as in modes.
@@ -124,9 +124,11 @@ def clutch(name: str, drive) -> dict:
     assert run.observed["gear_engaged"][k + ramp + 1] and not run.observed["gear_engaged"][k + ramp - 2]
     motor = {x: run.observed[f"u_{x}"] - run.observed[f"u_comp_{x}"] for x in "dq"}
     u = np.hypot(*(np.diff(to_si(f"u_{x}", np.asarray(of), drive)) for x, of in motor.items()))
-    step = float(u[k : k + ramp].max()) * math.sqrt(3.0) / drive.inverter.dc_bus_v
+    u *= math.sqrt(3.0) / drive.inverter.dc_bus_v
     what = "step of the voltage while it engages at half speed, of the circle"
-    return figures.row(f"{name}, gear", what, step, modes.TARGET, "1")
+    yield figures.row(f"{name}, gear", what, float(u[k : k + ramp].max()), modes.TARGET, "1")
+    what = "the same at constant speed behind it"
+    yield figures.row(f"{name}, gear", what, float(u[k + 3 * ramp :].max()), math.inf, "1")
 
 
 def at_a_stop(name: str) -> Iterator[dict]:
@@ -151,7 +153,7 @@ def rows_of(name: str) -> Iterator[dict]:
     yield from following(name, geared(figures.case(name)), "trapezoid", math.inf)
     if count_turns(drive) * COARSE < 1.0:
         yield from following(name, drive, f"master of {COARSE:,} counts", math.inf, COARSE)
-    yield clutch(name, drive)
+    yield from clutch(name, drive)
     yield from at_a_stop(name)
 
 
