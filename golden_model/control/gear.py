@@ -106,6 +106,9 @@ def stimuli(rng, _config):
         turn(5, 900, **slow, gear_on=0)
         turn(30, 900, **slow)
         turn(3, 900, **slow, gear_free=1)
+    odd = {"gear_numerator": 1, "gear_denominator": 1, "gear_step": 3}
+    for k in range(240):  # odd numerators in force: the rest passes every value of its lowest bits
+        turn(1, 37, **odd, gear_on=k & 1)
     for smooth in (0, 1, 5, 12):  # the lead, at its limit and away from it
         for lead in (0, 1, 530, 1023):
             turn(25, 70, gear_lead=lead, gear_smooth=smooth)
