@@ -150,7 +150,7 @@ def rows_of(name: str) -> Iterator[dict]:
     """All figures of a drive."""
     drive = soft(name)
     yield from following(name, drive, f"acceleration within {SOFT_SAMPLES} samples", 1.0)
-    yield from following(name, geared(figures.case(name)), "trapezoid", math.inf)
+    yield from following(name, geared(figures.case(name)), "trapezoid", 1.0)
     if count_turns(drive) * COARSE < 1.0:
         yield from following(name, drive, f"master of {COARSE:,} counts", math.inf, COARSE)
     yield from clutch(name, drive)
