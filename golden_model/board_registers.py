@@ -4,7 +4,7 @@
 One function for the Python bus, `fluxproof registers`, the C header of `fluxproof project` and the commissioning.
 
     board_registers(drive)   every setting of core and front ends, by name
-    board_generics(drive)    ENCODER, CURRENTS, SPI_LINES
+    board_generics(drive)    ENCODER, CURRENTS, SPI_LINES, MASTER
     board_set(drive)         the same as rows to print or to load
 
 Times become whole clocks, rounded up where a shorter one would be wrong.  A register of a front end that the drive
@@ -16,7 +16,7 @@ import math
 from golden_model.converters import sinc3, sinc_overcurrent
 from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError, needed
-from golden_model.encoders import edge_timer, position_bridge, turn_counter
+from golden_model.encoders import edge_timer, master_encoder, position_bridge, turn_counter
 from golden_model.front_ends import frame_s
 from golden_model.io import board_map, speed
 from golden_model.io.sample_checks import JUMP
@@ -48,6 +48,7 @@ def board_generics(drive: Drive) -> dict[str, int]:
         "encoder": ENCODER[drive.encoder.kind],
         "currents": CURRENTS[drive.converters.kind],
         "spi_lines": spi_lines(drive),
+        "master": int(drive.position.gear_master_counts is not None),
     }
 
 
@@ -80,7 +81,7 @@ def front_end_registers(drive: Drive) -> dict[str, int]:
     """Every setting of the front ends by name; DriveError names register and key of a value that does not fit."""
     ports = {name: port for name, port in board_map.settings().items() if name in board_map.SETTINGS}
     values = {name: max(port.low, 0) for name, port in ports.items()}
-    for part in (_encoder(drive), _converters(drive)):
+    for part in (_master(drive) | _encoder(drive), _converters(drive)):
         for name, (value, key) in part.items():
             low, high = ports[name].low, ports[name].high
             if not low <= value <= high:
@@ -153,6 +154,17 @@ def _incremental(drive: Drive) -> dict:
     found["whole_lines"] = (int(e.whole_lines), "[encoder] whole_lines")
     found["index_phase"] = (e.index_phase or 0, "[encoder] index_phase")
     return found
+
+
+def _master(drive: Drive) -> dict:
+    """The gear's second encoder at A/B pins; its filter is the other encoder's where that has edges."""
+    counts = drive.position.gear_master_counts
+    if counts is None:
+        return {}
+    given = drive.encoder.filter_s
+    found = {name: (value, "[position] gear_master_counts") for name, value in master_encoder.setting(counts).items()}
+    clocks = _up(FILTER_S if given is None else given, drive)
+    return found | {"filter_clocks": (clocks, "[encoder] filter_s, [core] clock_hz")}
 
 
 def _serial(drive: Drive) -> dict:

@@ -220,6 +220,7 @@ class Core:
     residual: bool = flag("true: the motor beside its description, docs/faults.md; needs the estimators", False)
     modes: bool = flag("true: voltage mode and changes of mode without a step, docs/modes.md", False)
     overmodulation: bool = flag("true: fundamentals of the voltage up to six-step, docs/overmodulation.md", False)
+    gearing: bool = flag("true: the position loop can follow a second encoder, docs/gearing.md", False)
     ring_rows: int = whole(0, 2730, "telemetry rows of the ring in block RAM, 42 in a RAMB36; 0: none", 0)
     gate_active: int = whole(0, 1, "level of the gate pins at which a switch is on", 1)
     trip_active: int = whole(0, 1, "level of the pin trip that turns the gates off", 1)

@@ -18,6 +18,7 @@ from golden_model.control import (
     dead_time_compensation,
     decoupling,
     flux_limit,
+    gear,
     mode_change,
     mode_references,
     position_control,
@@ -99,7 +100,8 @@ WIRING = {
     "modes": (mode_change, ("latch",)),
     "table_current": (current_reference, ("current_circle",)),
     "position_regulator": (position_control, ("latch",)),
-    "trajectory": (position_trajectory, ("position_regulator",)),
+    "master_gear": (gear, ("latch",)),
+    "trajectory": (position_trajectory, ("position_regulator", "master_gear")),
     "speed_regulator": (speed_pi, ("speed_measurement", "current_circle", "position_regulator", "modes")),
     "regeneration": (regeneration_limit, ("speed_regulator", "bus_voltage")),
     "flux_circle": (flux_limit, ("speed_measurement", "bus_voltage")),
@@ -161,6 +163,7 @@ EARLY = {
     ("stator_frame", "conditioning"): 1,
     ("rotor_frame", "stator_frame"): 1,
     ("trajectory", "position_regulator"): position_trajectory.LATE,
+    ("trajectory", "master_gear"): position_trajectory.GEAR_LATE,
     ("bus_reciprocal", "bus_voltage"): u_dc_conditioning.AHEAD,
     ("period_voltage", "bus_voltage"): u_dc_conditioning.AHEAD,
     ("checks", "bus_voltage"): u_dc_conditioning.AHEAD,
@@ -221,6 +224,7 @@ Registers = namedtuple("Registers", list(REGISTERS))
 # Generic -> the instances that only a core with it has, the narrowest part first
 PARTS = {
     "references": ("flux_circle", "ramp", "references", "voltage_regulator", "map_correction", "table_current"),
+    "gearing": ("master_gear",),
     "position_loop": ("position_regulator", "trajectory", "towards"),
     "modes": ("modes", "beginnings"),
     "residual": ("residual",),
@@ -256,6 +260,7 @@ class Config(NamedTuple):
     residual: int = 0  # 1: the residual of the motor beside its description, with the estimators
     modes: int = 0  # 1: voltage mode, and changes of mode without a step of the voltage
     overmodulation: int = 0  # 1: fundamentals up to six-step
+    gearing: int = 0  # 1: the position loop can follow a second encoder
 
 
 class Sample(NamedTuple):
@@ -354,6 +359,10 @@ class State(NamedTuple):
     u_beta: int = 0
     rip_alpha: int = 0
     rip_beta: int = 0
+    # The gear's part, likewise
+    of_gear: gear.State = gear.State()
+    gear_free: int = 1
+    at_stop: int = 0
 
 
 class Observed(NamedTuple):
@@ -434,6 +443,9 @@ class Observed(NamedTuple):
     position_restarted: int
     shaft_position: int
     position_error: int
+    gear_way: int
+    gear_engaged: int
+    gear_stopped: int
     code_a: int
     code_b: int
     code_c: int
@@ -456,6 +468,7 @@ class Given(NamedTuple):
     omega_given: int
     position_restart: int
     emf_samples: int
+    gear_code: int
 
 
 @kernel
@@ -463,7 +476,7 @@ def given_by_registers(regs):
     """Given as the registers say it, without a front end."""
     return Given(
         speed_given=regs.speed_given, omega_given=regs.omega_given, position_restart=regs.position_restart,
-        emf_samples=regs.emf_samples,
+        emf_samples=regs.emf_samples, gear_code=regs.gear_code,
     )  # fmt: skip
 
 
@@ -642,10 +655,25 @@ def step_table(state, sample, regs, config, of_speed, table):
             r,
         )  # fmt: skip
 
-    trajectory_state, (position_ref, omega_ff, torque_ff, at_rest) = state.of_position_trajectory, (0, 0, 0, 0)
+    gear_state, (gear_way, led, gear_engaged, gear_stopped) = state.of_gear, (0, 0, 0, 0)
+    if c.position_loop and c.gearing:
+        gear_state, (gear_way, led, gear_engaged, gear_stopped) = gear.step(
+            state.of_gear,
+            gear.Inputs(gear_free=state.gear_free, at_stop=state.at_stop),
+            gear.Registers(
+                gear_code=of_speed.gear_code, gear_on=r.gear_on, gear_numerator=r.gear_numerator,
+                gear_denominator=r.gear_denominator, gear_step=r.gear_step, gear_lead=r.gear_lead,
+                gear_smooth=r.gear_smooth,
+            ),
+        )  # fmt: skip
+    trajectory_state, (position_ref, omega_ff, torque_ff, at_rest, gear_free, at_stop) = (
+        state.of_position_trajectory, (0, 0, 0, 0, state.gear_free, state.at_stop),
+    )  # fmt: skip
     if c.position_loop:
-        trajectory_state, (position_ref, omega_ff, torque_ff, at_rest) = position_trajectory.step(
-            state.of_position_trajectory, position_trajectory.Inputs(shaft_position=shaft_position, run=x.run), r
+        trajectory_state, (position_ref, omega_ff, torque_ff, at_rest, gear_free, at_stop) = position_trajectory.step(
+            state.of_position_trajectory,
+            position_trajectory.Inputs(shaft_position=shaft_position, led=led, run=x.run),
+            r,
         )
 
     checks_state, (sample_faults, sample_trip) = sample_checks.step(
@@ -704,7 +732,8 @@ def step_table(state, sample, regs, config, of_speed, table):
         of_motor_residual=after.of_motor_residual, of_mode_change=modes_state, of_mode_references=references_state,
         u_rest_d=u_rest_d, u_rest_q=u_rest_q, of_overmodulation=hexagon_state,
         of_voltage_ripple=after.of_voltage_ripple, u_alpha=u_alpha, u_beta=u_beta,
-        rip_alpha=after.rip_alpha, rip_beta=after.rip_beta,
+        rip_alpha=after.rip_alpha, rip_beta=after.rip_beta, of_gear=gear_state, gear_free=gear_free,
+        at_stop=at_stop,
     )  # fmt: skip
     return following, Observed(
         i_a=i_a, i_b=i_b, i_c=i_c, current_at_rail=current_at_rail, u_dc=u_dc, u_max=u_max, u_dc_at_rail=u_dc_at_rail,
@@ -726,6 +755,7 @@ def step_table(state, sample, regs, config, of_speed, table):
         motion_faults=motion_faults, open_load=open_load, encoder_lost=encoder_lost, brake_asked=brake_asked,
         speed_was_given=speed_was_given,
         position_restarted=position_restarted, shaft_position=shaft_position, position_error=position_error,
+        gear_way=gear_way, gear_engaged=gear_engaged, gear_stopped=gear_stopped,
         code_a=x.adc_a, code_b=x.adc_b, code_c=x.adc_c, code_u_dc=x.adc_u_dc,
         code_theta=x.position_code, compare_a=compare_a, compare_b=compare_b, compare_c=compare_c,
     )  # fmt: skip

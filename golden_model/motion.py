@@ -9,9 +9,11 @@ encoder, no stops.
 import math
 from dataclasses import dataclass
 
+from golden_model.control import gear as gear_block
 from golden_model.control.position_control import POSITION
 from golden_model.control.position_plan import SECTION_BITS, WAY
 from golden_model.drive_keys import DriveError, not_negative, positive, real, whole
+from golden_model.encoders.turn_counter import COUNTS_MAX, COUNTS_MIN
 from golden_model.formats import PU
 from golden_model.protection_limits import OVERSPEED
 from golden_model.scale_entry import Entry, base_keys
@@ -21,6 +23,11 @@ OF_RATED = 0.8  # torque of the acceleration
 OF_SPEED_LOOP = 4.0  # speed bandwidth over position bandwidth
 SPEED_MARGIN = 1.25  # largest speed reference over that of the trajectory
 JERK_BITS_MOST, LEAD_MOST = 5, 7
+GEAR_LATE = 5  # samples from the way of the gear to position_ref beside two moving means and torque_lead
+SMOOTHER = 1  # samples of the mean speed over those of its lead: a count of the master moves it by one at most
+SMOOTH_MOST, NUMERATOR = gear_block.SMOOTH_MOST, gear_block.NUMERATOR
+_GEAR = {p.name: p.fmt for p in gear_block.REGISTERS}
+DENOMINATOR, GEAR_STEP, GEAR_LEAD = _GEAR["gear_denominator"], _GEAR["gear_step"], _GEAR["gear_lead"]
 
 
 @dataclass(frozen=True)
@@ -37,6 +44,17 @@ class Position:
     stop_low_rad: float | None = real("rad", "soft end stop", None)
     stop_high_rad: float | None = real("rad", "soft end stop", None)
     torque_lead_samples: int | None = whole(0, LEAD_MOST, "of the torque before the position; calculated if none", None)
+    gear_numerator: int | None = whole(
+        -NUMERATOR.hi, NUMERATOR.hi, "turns of this shaft in gear_denominator turns of the master", None
+    )
+    gear_denominator: int = whole(1, DENOMINATOR.hi, "turns of the master", 1)
+    gear_master_counts: int | None = whole(
+        COUNTS_MIN, COUNTS_MAX, "counts a turn of a master at A/B pins of the board; none: gear_code", None
+    )
+    gear_ramp_s: float = not_negative("s", "time in which the gear reaches its ratio", 0.1, most=1000.0)
+    gear_lead_samples: int | None = whole(
+        0, GEAR_LEAD.hi, "of the gear at the master's mean speed; the delay of the trajectory if none", None
+    )
 
 
 def check_position(drive):
@@ -53,6 +71,20 @@ def check_position(drive):
     if p.speed_rad_s is not None and not p.speed_rad_s < top:
         allowed = f"below {top:g} rad/s, where the drive trips: [protection] overspeed_rad_s"
         raise DriveError(f"[position] speed_rad_s = {p.speed_rad_s:g} is out of range: allowed is {allowed}")
+    if drive.core.gearing and not drive.core.position_loop:
+        raise DriveError("[core] gearing needs position_loop = true, which follows the gear")
+    if p.gear_numerator is not None and not drive.core.gearing:
+        raise DriveError("[position] gear_numerator is given and [core] gearing is not true: nothing would use it")
+    if p.gear_master_counts is not None:
+        if not drive.core.gearing:
+            raise DriveError(
+                "[position] gear_master_counts is given and [core] gearing is not true: nothing would use it"
+            )
+        if drive.encoder.kind == "code" and drive.converters.kind == "codes":
+            raise DriveError("[position] gear_master_counts needs a board: [encoder] or [converters] with a kind")
+    if not p.gear_numerator and drive.core.gearing:
+        found = "missing" if p.gear_numerator is None else "0"
+        raise DriveError(f"[position] gear_numerator is {found}: [core] gearing needs the ratio of the gear")
     if drive.core.position_loop and drive.control.speed_bandwidth_hz is None and p.bandwidth_hz is None:
         raise DriveError("[core] position_loop needs [control] speed_bandwidth_hz or [position] bandwidth_hz")
 
@@ -99,6 +131,42 @@ def torque_lead(drive):
     return min(round(lag), LEAD_MOST)
 
 
+def gear_ratio(drive):
+    """(numerator, denominator) as registers: as large as they fit, so that the numerator in force has small steps."""
+    p = drive.position
+    shared = math.gcd(p.gear_numerator, p.gear_denominator)
+    numerator, denominator = p.gear_numerator // shared, p.gear_denominator // shared
+    times = DENOMINATOR.hi // denominator
+    if numerator:
+        times = min(times, NUMERATOR.hi // abs(numerator))
+    return numerator * times, denominator * times
+
+
+def gear_delay(drive):
+    """Samples by which the trajectory, and with it the shaft, is late to the way of the gear."""
+    return (2 << (SECTION_BITS + limits(drive)[2])) + torque_lead(drive) + GEAR_LATE
+
+
+def gear(drive):
+    """The registers of the gear: name, value, unit, scale, keys; all zero without one."""
+    on, p = drive.core.gearing, drive.position
+    numerator, denominator = gear_ratio(drive) if on else (0, 1)
+    given = p.gear_lead_samples
+    lead = 0 if not on else gear_delay(drive) if given is None else given
+    smooth = min(math.ceil(math.log2(SMOOTHER * max(lead, 1))), SMOOTH_MOST) if on else 0
+    samples = max(1.0, p.gear_ramp_s / drive.sample_time_s)
+    step = max(abs(numerator) / samples, GEAR_STEP.lsb)
+    keys = "[position] gear_numerator, gear_denominator"
+    yield Entry("gear_code", 0.0, "turn", 1.0, "none: a front end, or the host, gives the master's code")
+    yield Entry("gear_on", 0, "1", 1.0, "none: 1 for a gear to the master, in position mode")
+    yield Entry("gear_numerator", numerator, "1", 1.0, keys)
+    yield Entry("gear_denominator", denominator, "1", 1.0, keys)
+    yield Entry("gear_step", step, "1", 1.0, f"{keys}, gear_ramp_s; [inverter] pwm_frequency_hz")
+    keys = "[position] gear_lead_samples, torque_lead_samples, jerk_rad_s3"
+    yield Entry("gear_lead", lead, "1", 1.0, keys)
+    yield Entry("gear_smooth", smooth, "1", 1.0, keys)
+
+
 def count_turns(drive):
     """A count of the encoder in turns of the shaft: its own or that of the position code, the larger one."""
     lines = drive.encoder.counts
@@ -141,6 +209,7 @@ def position_loop(drive):
     yield Entry("k_viscous", share * m.viscous_friction_nms, f"{unit} s/rad of shaft", one * t_s / TURN_RAD, keys)
     keys = "[machine] coulomb_friction_nm, magnet_flux_wb, pole_pairs"
     yield Entry("coulomb", share * m.coulomb_friction_nm, unit, one, keys)
+    yield from gear(drive)
 
 
 def _step(speed, acceleration, bits, t_s):

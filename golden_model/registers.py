@@ -61,6 +61,7 @@ def registers(drive: Drive, flux=None) -> RegisterSet:
         int(core.residual),
         int(core.modes),
         int(core.overmodulation),
+        int(core.gearing),
     )
     config = Config(drive.sensors.adc_bits, drive.sensors.position_bits, *generics)
     values = Registers(*(rows[name].integer for name in REGISTERS))

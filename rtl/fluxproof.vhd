@@ -12,6 +12,7 @@
 -- table gives both current references at the flux limit of speed and bus voltage, see control/reference_table.vhd.
 -- POSITION_LOOP = 1 builds a position loop over the speed loop and the trajectory that it follows, used with
 -- position_mode, see control/position_trajectory.vhd.
+-- GEARING = 1 lets this loop follow a second encoder, whose code is settings.gear_code, see control/gear.vhd.
 -- MODES = 1 builds voltage mode and changes of mode without a step of the voltage, see control/mode_references.vhd.
 -- OVERMODULATION = 1 lets the fundamental of the voltage go up to six-step, see modulation/overmodulation.vhd.
 -- RESIDUAL = 1 compares the motor with its description, see estimators/motor_residual.vhd.
@@ -39,7 +40,8 @@ entity fluxproof is
     POSITION_LOOP : natural range 0 to 1      := 0;  -- 1: a position loop over the speed loop, and its trajectory
     RESIDUAL      : natural range 0 to 1      := 0;  -- 1: the residual of the motor, with the estimators
     MODES         : natural range 0 to 1      := 0;  -- 1: voltage mode, changes of mode without a step of the voltage
-    OVERMODULATION : natural range 0 to 1     := 0  -- 1: fundamentals up to six-step
+    OVERMODULATION : natural range 0 to 1     := 0;  -- 1: fundamentals up to six-step
+    GEARING       : natural range 0 to 1      := 0  -- 1: a gear to a second encoder, with the position loop
   );
   port (
     clk             : in  std_logic;
@@ -231,6 +233,9 @@ begin
     signal position_ref   : signed(o.shaft_position'range);
     signal omega_ff       : signed(INTEGRAL_W - 1 downto 0);
     signal at_rest        : std_logic;
+    signal led            : signed(o.shaft_position'range);
+    signal gear_free      : std_logic;
+    signal at_stop        : std_logic;
   begin
     position_acts <= settings.position_mode;
 
@@ -245,16 +250,32 @@ begin
                 out_valid => open, shaft_position => o.shaft_position, position_error => o.position_error,
                 omega_asked => omega_asked, regulates => regulates);
 
+    by_gear : if GEARING = 1 generate
+      master_gear : entity work.gear
+        port map (clk => clk, rst => rst, in_valid => latch_valid,
+                  gear_free => gear_free, at_stop => at_stop,
+                  gear_code => settings.gear_code, gear_on => settings.gear_on,
+                  gear_numerator => settings.gear_numerator, gear_denominator => settings.gear_denominator,
+                  gear_step => settings.gear_step, gear_lead => settings.gear_lead, gear_smooth => settings.gear_smooth,
+                  out_valid => open, gear_way => o.gear_way, led => led, gear_engaged => o.gear_engaged,
+                  gear_stopped => o.gear_stopped);
+    else generate
+      led            <= (others => '0');
+      o.gear_way     <= (others => '0');
+      o.gear_engaged <= '0';
+      o.gear_stopped <= '0';
+    end generate by_gear;
+
     trajectory : entity work.position_trajectory
       port map (clk => clk, rst => rst, in_valid => latch_valid,
-                shaft_position => o.shaft_position, run => run,
+                shaft_position => o.shaft_position, led => led, run => run,
                 position_mode => settings.position_mode, position_target => settings.position_target,
                 move_speed => settings.move_speed, move_step => settings.move_step, jerk_bits => settings.jerk_bits,
                 use_stops => settings.use_stops, stop_low => settings.stop_low, stop_high => settings.stop_high,
                 torque_lead => settings.torque_lead, k_speed => settings.k_speed, k_filter => settings.k_filter,
                 k_inertia => settings.k_inertia, k_viscous => settings.k_viscous, coulomb => settings.coulomb,
                 out_valid => open, position_ref => position_ref, omega_ff => omega_ff, torque_ff => torque_ff,
-                at_rest => at_rest);
+                at_rest => at_rest, gear_free => gear_free, at_stop => at_stop);
   else generate
     position_acts    <= '0';
     omega_asked      <= omega_source;
@@ -262,6 +283,9 @@ begin
     torque_ff        <= (others => '0');
     o.shaft_position <= (others => '0');
     o.position_error <= (others => '0');
+    o.gear_way       <= (others => '0');
+    o.gear_engaged   <= '0';
+    o.gear_stopped   <= '0';
   end generate by_position;
 
   by_mode : if MODES = 1 generate

@@ -14,6 +14,7 @@ proc init_gui {IPINST} {
   ipgui::add_param $IPINST -name "RESIDUAL" -parent ${page}
   ipgui::add_param $IPINST -name "MODES" -parent ${page}
   ipgui::add_param $IPINST -name "OVERMODULATION" -parent ${page}
+  ipgui::add_param $IPINST -name "GEARING" -parent ${page}
   ipgui::add_param $IPINST -name "RING_ROWS" -parent ${page}
   ipgui::add_param $IPINST -name "GATE_ACTIVE" -parent ${page}
   ipgui::add_param $IPINST -name "TRIP_ACTIVE" -parent ${page}
@@ -129,6 +130,17 @@ proc validate_PARAM_VALUE.OVERMODULATION {PARAM_VALUE.OVERMODULATION} {
 
 proc update_MODELPARAM_VALUE.OVERMODULATION {MODELPARAM_VALUE.OVERMODULATION PARAM_VALUE.OVERMODULATION} {
   set_property value [get_property value ${PARAM_VALUE.OVERMODULATION}] ${MODELPARAM_VALUE.OVERMODULATION}
+}
+
+proc update_PARAM_VALUE.GEARING {PARAM_VALUE.GEARING} {
+}
+
+proc validate_PARAM_VALUE.GEARING {PARAM_VALUE.GEARING} {
+  return true
+}
+
+proc update_MODELPARAM_VALUE.GEARING {MODELPARAM_VALUE.GEARING PARAM_VALUE.GEARING} {
+  set_property value [get_property value ${PARAM_VALUE.GEARING}] ${MODELPARAM_VALUE.GEARING}
 }
 
 proc update_PARAM_VALUE.RING_ROWS {PARAM_VALUE.RING_ROWS} {

@@ -214,7 +214,7 @@ def test_html_and_ipxact_contain_every_register(top, tmp_path):
 def test_model_refuses_without_changing_registers():
     """The model alone: a drive's registers are written and read back; a refused write changes nothing."""
     generics = {"adc_bits": 16, "position_bits": 16, "carrier_half": 10000, "clock_hz": 200_000_000}
-    parts = ("references", "position_loop", "residual", "modes", "overmodulation")
+    parts = ("references", "position_loop", "residual", "modes", "overmodulation", "gearing")
     bus = RegisterFile(generics | {"estimators": 1} | dict.fromkeys(parts, 0))
     values = drive_registers.registers(load(PAPER)).values
     for name, value in values._asdict().items():

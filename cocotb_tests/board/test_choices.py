@@ -17,9 +17,10 @@ CHOICES += [(1, currents) for currents in (0, 2, 3)]
 
 @pytest.mark.parametrize(("encoder", "currents"), CHOICES)
 def test_every_choice_elaborates(encoder, currents):
-    """With other widths than the defaults, and without estimators."""
+    """With other widths than the defaults, and without estimators; every second one with the gear and its master."""
     folder = ghdl.build("fluxproof_board")
     generics = {"ENCODER": encoder, "CURRENTS": currents, "ADC_BITS": 12, "POSITION_BITS": 18, "SPI_LINES": 2}
+    generics |= dict.fromkeys(("POSITION_LOOP", "GEARING", "MASTER"), encoder % 2)
     given = [f"-g{name}={value}" for name, value in (generics | {"ESTIMATORS": 0}).items()]
     command = [str(folder / "fluxproof_board"), *given, "--stop-time=20ns", "--ieee-asserts=disable"]
     if not (folder / "fluxproof_board").exists():  # the mcode back end makes no program

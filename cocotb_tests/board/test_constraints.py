@@ -28,13 +28,14 @@ def test_every_first_register_of_a_pin_is_constrained():
 def test_the_instances_have_these_names():
     top = (RTL / "generated" / "fluxproof_board.vhd").read_text()
     labels = set(re.findall(r"(?:NAME =~ \*|get_pins )(\w+)/", TEXT))
-    assert labels == {"position", "converters", "stage"}
+    assert labels == {"position", "master_pins", "converters", "stage"}
     assert all(re.search(rf"^  {label} : entity work\.", top, re.MULTILINE) for label in labels)
 
 
 PINS = (
     "stage/caught_reg/PRE", "stage/filtered.filter/sync_1_reg/D",
-    "position/edges/filter_a/sync_1_reg/D", "converters/spi/frame/busy_meta_reg/D",
+    "position/edges/filter_a/sync_1_reg/D", "master_pins/built.filters[0].filter/sync_1_reg/D",
+    "converters/spi/frame/busy_meta_reg/D",
     "converters/bits/clock_meta_reg/D", "converters/spi/words/miso_meta_reg[0]/D", "converters/bits/data_meta_reg[3]/D",
 )  # fmt: skip
 
@@ -46,10 +47,10 @@ def test_every_pattern_finds_its_pins_wherever_the_board_is(tmp_path, above):
     facts.write_text("set design_pins {" + " ".join(above + pin for pin in PINS) + "}\n")
     done = stubbed(facts, ROOT / "scripts" / "vivado" / "fluxproof_board.xdc")
     assert done.returncode == 0, done.stderr
-    assert done.stdout.count("\nset_false_path") == 5 and done.stdout.count("\nset_max_delay") == 2
+    assert done.stdout.count("\nset_false_path") == 6 and done.stdout.count("\nset_max_delay") == 2
     counted = stubbed(facts, ROOT / "scripts" / "vivado" / "board_pins.tcl")
     told = re.findall(r"^fluxproof_board.xdc: (\d+) pins match", counted.stdout, re.MULTILINE)
-    assert told == ["1"] * len(PINS) and "7 pins in all" in counted.stdout, counted.stdout + counted.stderr
+    assert told == ["1"] * len(PINS) and "8 pins in all" in counted.stdout, counted.stdout + counted.stderr
 
 
 def test_what_is_not_built_counts_as_nothing_and_a_missing_board_is_an_error(tmp_path):

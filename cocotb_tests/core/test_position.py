@@ -29,7 +29,7 @@ def course(targets, samples, **values):
     for target in targets:
         regs = trajectory.Registers(**(ONE | values | {"position_target": target}))
         for _ in range(samples):
-            state, out = trajectory.step(state, trajectory.Inputs(0, 1), regs)
+            state, out = trajectory.step(state, trajectory.Inputs(0, 0, 1), regs)
             rows.append((state.way * WAY.lsb, out[0]))
     return np.array(rows), state
 

@@ -176,10 +176,16 @@ static void check_generics(void)
 #if FLUXPROOF_MODES
         {"MODES", AT(modes), 1},
 #endif
+#if FLUXPROOF_GEARING
+        {"GEARING", AT(gearing), 1},
+#endif
 #ifdef FLUXPROOF_ENCODER /* the drive file has front ends: the core must be a fluxproof_board with them */
         {"ENCODER", AT(encoder), FLUXPROOF_ENCODER},
         {"CURRENTS", AT(currents), FLUXPROOF_CURRENTS},
         {"SPI_LINES", AT(spi_lines), FLUXPROOF_SPI_LINES},
+#if FLUXPROOF_MASTER
+        {"MASTER", AT(master), 1},
+#endif
 #endif
     };
     for (size_t k = 0; k < COUNT(list); k++) {

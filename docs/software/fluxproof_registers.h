@@ -73,6 +73,11 @@ extern "C" {
 #define FLUXPROOF__OVERMODULATION__VALUE_bp 0
 #define FLUXPROOF__OVERMODULATION__VALUE_bw 32
 
+// reg - fluxproof::gearing
+#define FLUXPROOF__GEARING__VALUE_bm 0xffffffff
+#define FLUXPROOF__GEARING__VALUE_bp 0
+#define FLUXPROOF__GEARING__VALUE_bw 32
+
 // reg - fluxproof::enable
 #define FLUXPROOF__ENABLE__VALUE_bm 0x1
 #define FLUXPROOF__ENABLE__VALUE_bp 0
@@ -209,6 +214,12 @@ extern "C" {
 #define FLUXPROOF__FLAGS__REGEN_LIMITED_bm 0x10000
 #define FLUXPROOF__FLAGS__REGEN_LIMITED_bp 16
 #define FLUXPROOF__FLAGS__REGEN_LIMITED_bw 1
+#define FLUXPROOF__FLAGS__GEAR_ENGAGED_bm 0x20000
+#define FLUXPROOF__FLAGS__GEAR_ENGAGED_bp 17
+#define FLUXPROOF__FLAGS__GEAR_ENGAGED_bw 1
+#define FLUXPROOF__FLAGS__GEAR_STOPPED_bm 0x40000
+#define FLUXPROOF__FLAGS__GEAR_STOPPED_bp 18
+#define FLUXPROOF__FLAGS__GEAR_STOPPED_bw 1
 #define FLUXPROOF__FLAGS__MOTOR_DIFFERS_bm 0x1000000
 #define FLUXPROOF__FLAGS__MOTOR_DIFFERS_bp 24
 #define FLUXPROOF__FLAGS__MOTOR_DIFFERS_bw 1
@@ -1037,6 +1048,53 @@ extern "C" {
 #define FLUXPROOF__POSITION_ERROR__VALUE_bp 0
 #define FLUXPROOF__POSITION_ERROR__VALUE_bw 32
 
+// reg - fluxproof::gear_way
+#define FLUXPROOF__GEAR_WAY__VALUE_bm 0xffffffff
+#define FLUXPROOF__GEAR_WAY__VALUE_bp 0
+#define FLUXPROOF__GEAR_WAY__VALUE_bw 32
+
+// reg - fluxproof::gear_on
+#define FLUXPROOF__GEAR_ON__VALUE_bm 0x1
+#define FLUXPROOF__GEAR_ON__VALUE_bp 0
+#define FLUXPROOF__GEAR_ON__VALUE_bw 1
+#define FLUXPROOF__GEAR_ON__VALUE_reset 0x0
+
+// reg - fluxproof::gear_numerator
+#define FLUXPROOF__GEAR_NUMERATOR__VALUE_bm 0xffffffff
+#define FLUXPROOF__GEAR_NUMERATOR__VALUE_bp 0
+#define FLUXPROOF__GEAR_NUMERATOR__VALUE_bw 32
+#define FLUXPROOF__GEAR_NUMERATOR__VALUE_reset 0x0
+
+// reg - fluxproof::gear_denominator
+#define FLUXPROOF__GEAR_DENOMINATOR__VALUE_bm 0xffff
+#define FLUXPROOF__GEAR_DENOMINATOR__VALUE_bp 0
+#define FLUXPROOF__GEAR_DENOMINATOR__VALUE_bw 16
+#define FLUXPROOF__GEAR_DENOMINATOR__VALUE_reset 0x1
+
+// reg - fluxproof::gear_step
+#define FLUXPROOF__GEAR_STEP__VALUE_bm 0x1ffffff
+#define FLUXPROOF__GEAR_STEP__VALUE_bp 0
+#define FLUXPROOF__GEAR_STEP__VALUE_bw 25
+#define FLUXPROOF__GEAR_STEP__VALUE_reset 0x1
+
+// reg - fluxproof::gear_lead
+#define FLUXPROOF__GEAR_LEAD__VALUE_bm 0x3ff
+#define FLUXPROOF__GEAR_LEAD__VALUE_bp 0
+#define FLUXPROOF__GEAR_LEAD__VALUE_bw 10
+#define FLUXPROOF__GEAR_LEAD__VALUE_reset 0x0
+
+// reg - fluxproof::gear_smooth
+#define FLUXPROOF__GEAR_SMOOTH__VALUE_bm 0xf
+#define FLUXPROOF__GEAR_SMOOTH__VALUE_bp 0
+#define FLUXPROOF__GEAR_SMOOTH__VALUE_bw 4
+#define FLUXPROOF__GEAR_SMOOTH__VALUE_reset 0x0
+
+// reg - fluxproof::gear_code
+#define FLUXPROOF__GEAR_CODE__VALUE_bm 0x3ffff
+#define FLUXPROOF__GEAR_CODE__VALUE_bp 0
+#define FLUXPROOF__GEAR_CODE__VALUE_bw 18
+#define FLUXPROOF__GEAR_CODE__VALUE_reset 0x0
+
 // reg - fluxproof::residual_min
 #define FLUXPROOF__RESIDUAL_MIN__VALUE_bm 0x1ffff
 #define FLUXPROOF__RESIDUAL_MIN__VALUE_bp 0
@@ -1223,6 +1281,11 @@ extern "C" {
 #define FLUXPROOF__SPI_LINES__VALUE_bp 0
 #define FLUXPROOF__SPI_LINES__VALUE_bw 32
 
+// reg - fluxproof::master
+#define FLUXPROOF__MASTER__VALUE_bm 0xffffffff
+#define FLUXPROOF__MASTER__VALUE_bp 0
+#define FLUXPROOF__MASTER__VALUE_bw 32
+
 // reg - fluxproof::clear_encoder
 #define FLUXPROOF__CLEAR_ENCODER__VALUE_bm 0x1
 #define FLUXPROOF__CLEAR_ENCODER__VALUE_bp 0
@@ -1358,6 +1421,11 @@ extern "C" {
 #define FLUXPROOF__SNAP_ADC_U_DC__VALUE_bm 0xffff
 #define FLUXPROOF__SNAP_ADC_U_DC__VALUE_bp 0
 #define FLUXPROOF__SNAP_ADC_U_DC__VALUE_bw 16
+
+// reg - fluxproof::master_illegal
+#define FLUXPROOF__MASTER_ILLEGAL__VALUE_bm 0xfff
+#define FLUXPROOF__MASTER_ILLEGAL__VALUE_bp 0
+#define FLUXPROOF__MASTER_ILLEGAL__VALUE_bw 12
 
 // reg - fluxproof::filter_clocks
 #define FLUXPROOF__FILTER_CLOCKS__VALUE_bm 0x3ff
@@ -1688,6 +1756,24 @@ extern "C" {
 #define FLUXPROOF__LIMIT_LOW__VALUE_bp 0
 #define FLUXPROOF__LIMIT_LOW__VALUE_bw 16
 #define FLUXPROOF__LIMIT_LOW__VALUE_reset 0x0
+
+// reg - fluxproof::master_counts
+#define FLUXPROOF__MASTER_COUNTS__VALUE_bm 0x7ffff
+#define FLUXPROOF__MASTER_COUNTS__VALUE_bp 0
+#define FLUXPROOF__MASTER_COUNTS__VALUE_bw 19
+#define FLUXPROOF__MASTER_COUNTS__VALUE_reset 0x0
+
+// reg - fluxproof::master_step
+#define FLUXPROOF__MASTER_STEP__VALUE_bm 0x1ffff
+#define FLUXPROOF__MASTER_STEP__VALUE_bp 0
+#define FLUXPROOF__MASTER_STEP__VALUE_bw 17
+#define FLUXPROOF__MASTER_STEP__VALUE_reset 0x0
+
+// reg - fluxproof::master_rest
+#define FLUXPROOF__MASTER_REST__VALUE_bm 0x3ffff
+#define FLUXPROOF__MASTER_REST__VALUE_bp 0
+#define FLUXPROOF__MASTER_REST__VALUE_bw 18
+#define FLUXPROOF__MASTER_REST__VALUE_reset 0x0
 
 // reg - fluxproof::motor_u_dc
 #define FLUXPROOF__MOTOR_U_DC__VALUE_bm 0xffffffff
@@ -2063,7 +2149,8 @@ typedef struct {
     uint32_t residual;
     uint32_t modes;
     uint32_t overmodulation;
-    uint8_t RESERVED_30_3f[0x10];
+    uint32_t gearing;
+    uint8_t RESERVED_34_3f[0xc];
     uint32_t enable;
     uint32_t clear_trip;
     uint32_t clear_faults;
@@ -2229,7 +2316,15 @@ typedef struct {
     uint8_t RESERVED_2d8_2df[0x8];
     uint32_t shaft_position;
     uint32_t position_error;
-    uint8_t RESERVED_2e8_33f[0x58];
+    uint32_t gear_way;
+    uint32_t gear_on;
+    uint32_t gear_numerator;
+    uint32_t gear_denominator;
+    uint32_t gear_step;
+    uint32_t gear_lead;
+    uint32_t gear_smooth;
+    uint32_t gear_code;
+    uint8_t RESERVED_308_33f[0x38];
     uint32_t residual_min;
     uint32_t residual_w;
     uint32_t residual_i;
@@ -2264,7 +2359,7 @@ typedef struct {
     uint32_t encoder;
     uint32_t currents;
     uint32_t spi_lines;
-    uint8_t RESERVED_40c_40f[0x4];
+    uint32_t master;
     uint32_t clear_encoder;
     uint32_t take_snapshot;
     uint32_t position_source;
@@ -2293,7 +2388,8 @@ typedef struct {
     uint32_t snap_adc_b;
     uint32_t snap_adc_c;
     uint32_t snap_adc_u_dc;
-    uint8_t RESERVED_494_4ff[0x6c];
+    uint32_t master_illegal;
+    uint8_t RESERVED_498_4ff[0x68];
     uint32_t filter_clocks;
     uint32_t index_phase;
     uint32_t counts;
@@ -2349,7 +2445,10 @@ typedef struct {
     uint32_t trip_oversampling;
     uint32_t limit_high;
     uint32_t limit_low;
-    uint8_t RESERVED_5dc_7ff[0x224];
+    uint32_t master_counts;
+    uint32_t master_step;
+    uint32_t master_rest;
+    uint8_t RESERVED_5e8_7ff[0x218];
     uint32_t motor_u_dc;
     uint32_t motor_load;
     uint32_t motor_start;

@@ -192,6 +192,7 @@ def advance(state, inputs, usual, around, memory, first, periods):
             omega_given=omega,
             position_restart=1 if jumped else usual.position_restart,
             emf_samples=emf_samples,
+            gear_code=usual.gear_code,
         )
         state, seen = fluxproof.step_given(state, sample, usual, config, of_speed)
         for n, value in enumerate(seen):

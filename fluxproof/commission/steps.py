@@ -18,7 +18,8 @@ def check_generics(bus: Bus, drive: Drive) -> None:
     """The core is the one of the drive file; Refusal where it was built for other widths, clocks or pins."""
     config = registers(drive).config
     # Commissioning works with currents: whether the core has a torque table or a position loop does not matter.
-    asked = {name: value for name, value in config._asdict().items() if name not in ("references", "position_loop")}
+    beside = ("references", "position_loop", "gearing")
+    asked = {name: value for name, value in config._asdict().items() if name not in beside}
     wanted = asked | {"clock_hz": round(drive.core.clock_hz)} | board_generics(drive)
     for name, value in wanted.items():
         if (found := bus.read(name)) != value:

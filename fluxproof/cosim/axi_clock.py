@@ -61,14 +61,16 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, trip_filter):
     # numba wants every field: those of the front ends stay 0
     given = Wires(
         trigger=w.trigger, gate_high=w.gate_high, gate_low=w.gate_low, sample_valid=p[0], codes_done=0, adc_a=p[1],
-        adc_b=p[2], adc_c=p[3], adc_u_dc=p[4], encoder_code=0, encoder_restart=0, omega_now=b.omega_given,
+        adc_b=p[2], adc_c=p[3], adc_u_dc=p[4], encoder_code=0, encoder_restart=0, master_code=0,
+        omega_now=b.omega_given,
         position_done=0, encoder_count=0, encoder_flags=0, index_wrong=0, position_lost=0, converter_over=0,
         angle_unknown=0, hall_wrong=0, forced=0, position_code=p[5], position_restart=0, speed_now=b.speed_given,
         board_stop=0, core_clear=0, running=w.running, tripped=w.tripped, fault_flags=w.fault_flags,
         setting_refused=w.setting_refused, irq=w.irq,
     )  # fmt: skip
     now = State(
-        of_core=s.of_core, of_position=s.of_position, of_converters=s.of_converters, of_forcing=s.of_forcing,
+        of_core=s.of_core, of_position=s.of_position, of_master=s.of_master,
+        of_converters=s.of_converters, of_forcing=s.of_forcing,
         of_join=s.of_join, of_faults=s.of_faults, of_snapshot=s.of_snapshot, of_interrupts=s.of_interrupts,
         of_filter=s.of_filter, caught=s.caught, trip_1=s.trip_1, trip_2=s.trip_2, wires=given,
     )  # fmt: skip
@@ -77,13 +79,15 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, trip_filter):
     )
     wires = Wires(
         trigger=z.sample_trigger, gate_high=z.gate_high, gate_low=z.gate_low, sample_valid=0, codes_done=0, adc_a=0,
-        adc_b=0, adc_c=0, adc_u_dc=0, encoder_code=0, encoder_restart=0, omega_now=0, position_done=0,
+        adc_b=0, adc_c=0, adc_u_dc=0, encoder_code=0, encoder_restart=0,
+        master_code=0, omega_now=0, position_done=0,
         encoder_count=0, encoder_flags=0, index_wrong=0, position_lost=0, converter_over=0, angle_unknown=0,
         hall_wrong=0, forced=0, position_code=0, position_restart=0, speed_now=0, board_stop=0, core_clear=0,
         running=z.running, tripped=z.tripped, fault_flags=z.fault_flags, setting_refused=z.setting_refused, irq=irq,
     )  # fmt: skip
     following = State(
-        of_core=core, of_position=s.of_position, of_converters=s.of_converters, of_forcing=s.of_forcing,
+        of_core=core, of_position=s.of_position, of_master=s.of_master,
+        of_converters=s.of_converters, of_forcing=s.of_forcing,
         of_join=s.of_join, of_faults=s.of_faults, of_snapshot=s.of_snapshot, of_interrupts=causes,
         of_filter=stage[0], caught=stage[1], trip_1=stage[2], trip_2=s.trip_1, wires=wires,
     )  # fmt: skip
@@ -123,7 +127,8 @@ class AxiClock(BoardClock):
     def generics(self) -> dict[str, int]:
         """By the names of the VHDL."""
         generics = self.blocks.generics(self.clock_hz)
-        return {name: value for name, value in generics.items() if name not in ("ENCODER", "CURRENTS", "SPI_LINES")}
+        own = ("ENCODER", "CURRENTS", "SPI_LINES", "MASTER")
+        return {name: value for name, value in generics.items() if name not in own}
 
     def beside(
         self, board: BoardClock, writes: Sequence[Write], trip: np.ndarray

@@ -18,7 +18,7 @@ from fluxproof.cosim.golden_clock import Due, arrive, inputs_of, rows_of
 from golden_model import clocked, fluxproof
 from golden_model.common import input_filter
 from golden_model.converters import current_front
-from golden_model.encoders import forced_position, position_front
+from golden_model.encoders import forced_position, master_encoder, position_front
 from golden_model.io import board_faults, board_map, board_snapshot, interrupts, sample_join
 from golden_model.io.register_file import RegisterFile
 from golden_model.io.register_map import OKAY, Kind
@@ -30,7 +30,7 @@ REFERENCES = ("omega_ref", "i_d_ref", "i_q_ext", "speed_mode", "temp_winding", "
 # The pins in the order of the blocks' inputs; what is not a pin comes from another block or a register.
 POSITION_PINS = tuple(p.name for p in position_front.BLOCK.inputs[:8])
 CONVERTER_PINS = tuple(p.name for p in current_front.BLOCK.inputs[:12])
-PINS = (*POSITION_PINS, *CONVERTER_PINS, "trip")
+PINS = (*POSITION_PINS, *CONVERTER_PINS, "master_a", "master_b", "trip")
 AT_CONVERTERS, AT_TRIP = len(POSITION_PINS), len(PINS) - 1
 GATES = ("gate_high", "gate_low", "sample_trigger", "irq")
 SEEN = (
@@ -49,6 +49,7 @@ SEEN = (
 # What is not a pin, of the same rows
 STATUS = tuple(board_map.STATUS)
 position_step, converter_step, forced_step = position_front.step, current_front.step, forced_position.step
+master_step = master_encoder.step
 join_step, faults_step, snapshot_step = sample_join.step, board_faults.step, board_snapshot.step
 interrupts_step, filter_step = interrupts.step, input_filter.step
 
@@ -67,6 +68,7 @@ class Wires(NamedTuple):
     adc_u_dc: int = 0
     encoder_code: int = 0
     encoder_restart: int = 0
+    master_code: int = 0
     omega_now: int = 0
     position_done: int = 0
     encoder_count: int = 0
@@ -92,6 +94,7 @@ class Wires(NamedTuple):
 class State(NamedTuple):
     of_core: clocked.State = clocked.State()
     of_position: position_front.State = position_front.State()
+    of_master: master_encoder.State = master_encoder.State()
     of_converters: current_front.State = current_front.State()
     of_forcing: forced_position.State = forced_position.State()
     of_join: sample_join.State = sample_join.State()
@@ -109,6 +112,7 @@ class BoardRegisters(NamedTuple):
     """The registers that the front ends, the snapshot and the interrupt read."""
 
     position: tuple  # position_front.Registers
+    master: tuple  # master_encoder.Registers
     converters: tuple  # current_front.Registers
     # Of the core
     reverse: int
@@ -161,7 +165,7 @@ def core_clock(state, inputs, regs, irq, ways, carrier_half, trip_filter):
 def one_clock(state, inputs, regs, b, pins, carrier_half, config):
     """One clock: (next state, whether a sample has entered, core, position, converters, board, snapshot, gates off)."""
     w, p, c = state.wires, pins, AT_CONVERTERS
-    encoder, currents, adc_bits, position_bits, lines, trip_filter = config
+    encoder, currents, adc_bits, position_bits, lines, trip_filter, master_built = config
     position, seen_position = position_step(
         state.of_position,
         position_front.Inputs(
@@ -173,6 +177,14 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
         encoder,
         position_bits,
     )  # fmt: skip
+    master, (master_code, master_illegal) = master_step(
+        state.of_master,
+        master_encoder.Inputs(
+            master_a=p[AT_TRIP - 2], master_b=p[AT_TRIP - 1], sample_trigger=w.trigger, clear_encoder=b.clear_encoder
+        ),
+        b.master,
+        master_built,
+    )
     converters, seen_converters = converter_step(
         state.of_converters,
         current_front.Inputs(
@@ -215,6 +227,7 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
         adc_u_dc=y.adc_u_dc,
         encoder_code=x.encoder_code,
         encoder_restart=x.encoder_restart,
+        master_code=master_code,
         omega_now=x.omega_now,
         position_done=x.position_done,
         encoder_count=x.encoder_count,
@@ -239,6 +252,7 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
     following = State(
         of_core=core,
         of_position=position,
+        of_master=master,
         of_converters=converters,
         of_forcing=forcing,
         of_join=join,
@@ -251,7 +265,7 @@ def one_clock(state, inputs, regs, b, pins, carrier_half, config):
         trip_2=state.trip_1,
         wires=wires,
     )
-    board = (forced, board_flags, board_first)
+    board = (forced, board_flags, board_first, master_illegal)
     return following, entered, seen_core, seen_position, seen_converters, board, seen_snapshot, off
 
 
@@ -281,7 +295,7 @@ def run_clocks(state, inputs, regs, b, pins, carrier_half, config, until_idle, s
         y[0], y[1], y[2] = position.encoder_flags, position.encoder_count, position.index_count
         y[3], y[4], y[5] = position.illegal_count, position.lost_counts, position.bridged_count
         y[6], y[7] = converters.converter_errors, converters.converter_refused
-        y[8], y[9], y[10] = board
+        y[8], y[9], y[10], y[20] = board
         y[11], y[12], y[13], y[14], y[15], y[16], y[17], y[18], y[19] = snapshot
         if entered:
             return state, k + 1, entered, before
@@ -292,15 +306,21 @@ class GoldenBlocks:
     """Which kind of front ends: the generics of fluxproof_board that the golden board needs."""
 
     def __init__(
-        self, config: fluxproof.Config, encoder: int = 1, currents: int = 1, spi_lines: int = 4, trip_filter: int = 0
+        self,
+        config: fluxproof.Config,
+        encoder: int = 1,
+        currents: int = 1,
+        spi_lines: int = 4,
+        trip_filter: int = 0,
+        master: int = 0,
     ):
         self.core, self.encoder, self.currents, self.spi_lines = config, encoder, currents, spi_lines
-        self.trip_filter = trip_filter
+        self.trip_filter, self.master = trip_filter, master
 
     def generics(self, clock_hz: int) -> dict[str, int]:
         """By the names of the VHDL."""
         own = {"ENCODER": self.encoder, "CURRENTS": self.currents, "SPI_LINES": self.spi_lines}
-        own |= {"TRIP_FILTER": self.trip_filter}
+        own |= {"TRIP_FILTER": self.trip_filter, "MASTER": self.master}
         return {name.upper(): value for name, value in self.core._asdict().items()} | own | {"CLOCK_HZ": clock_hz}
 
 
@@ -313,12 +333,12 @@ class BoardClock:
     def __init__(self, blocks: GoldenBlocks, clock_hz: int):
         self.blocks, self.clock_hz, core = blocks, clock_hz, blocks.core
         generics = {**core._asdict(), "clock_hz": clock_hz}
-        self.registers = RegisterFile(generics)
+        self.registers = RegisterFile(generics, beside={"master": blocks.master})
         self.registers.map = board_map.registers()
         self.registers.at = {register.address: register for register in self.registers.map.values()}
         self.registers.reset()
         self.config = (blocks.encoder, blocks.currents, core.adc_bits, core.position_bits, blocks.spi_lines)
-        self.config += (blocks.trip_filter,)
+        self.config += (blocks.trip_filter, blocks.master)
         self.state, self.of_samples = State(), fluxproof.State()
         self.inputs = clocked.Inputs()
         self.clock = 0
@@ -371,7 +391,8 @@ class BoardClock:
             return of(**parts, **{name: self.registers.values.get(name, 0) for name in of._fields if name not in parts})
 
         position, converters = record(position_front.Registers), record(current_front.Registers)
-        return record(BoardRegisters, position=position, converters=converters)
+        master = record(master_encoder.Registers)
+        return record(BoardRegisters, position=position, master=master, converters=converters)
 
     def _take_due(self) -> None:
         """Results of a sample and registers that change with the clock that has passed."""
@@ -411,6 +432,7 @@ class BoardClock:
         registers = self._settings()._replace(
             min_pulse=gates.min_pulse,
             double_update=gates.double_update,
+            gear_code=w.master_code if self.blocks.master else values["gear_code"],
             omega_given=w.omega_now,
             speed_given=w.speed_now,
             position_restart=1 if values["position_restart"] or w.position_restart else 0,

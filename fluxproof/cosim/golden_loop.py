@@ -158,6 +158,7 @@ def run_switching(state, stimulus, bench, first, out, observed):
             omega_given=omega_given,
             position_restart=b.registers.position_restart,
             emf_samples=b.registers.emf_samples,
+            gear_code=b.registers.gear_code,
         )
         sample = fluxproof.Sample(
             adc_a=current_code(sensors, 0, plant_state[L.I_A], first + k),

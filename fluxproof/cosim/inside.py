@@ -15,7 +15,7 @@ DRIVER = {
 
 
 LEFT_OUT = (
-    *("position_regulator", "residual", "modes", "beginnings"),
+    *("position_regulator", "master_gear", "residual", "modes", "beginnings"),
     *("ripple_answer", "ripple", "hexagon"),
 )  # instances that the default generics leave out
 

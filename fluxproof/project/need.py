@@ -34,9 +34,11 @@ ENCODERS = {
     "endat": Cells(316, 1),
 }  # fmt: skip
 CONVERTERS = {"codes": Cells(0, 0), "spi": Cells(442, 0), "xadc": Cells(156, 0), "delta_sigma": Cells(1133, 4)}
+MASTER = Cells(338, 0)  # pins of a second encoder
 BOARD = Cells(114 + 3 + 42 + 3 + 1510, 0)  # what else a board has, its registers for the core's
 OPTIONS = {  # keys of [core] that build a block in, counted on the page of each
-    "position_loop": Cells(707 + 269, 2), "references": Cells(1084, 6), "residual": Cells(2059, 1),
+    "position_loop": Cells(816 + 269, 2), "gearing": Cells(801, 1), "references": Cells(1084, 6),
+    "residual": Cells(2059, 1),
     "ring_rows": Cells(97, 0), "modes": Cells(5 + 353, 0), "overmodulation": Cells(327 + 76 + 552, 11),
 }  # fmt: skip
 MOTOR = Cells(4461, 32)  # motor_bench without its registers: docs/hil.md
@@ -79,6 +81,8 @@ def need(drive: Drive, estimators: bool, hil: bool = False) -> Cells:
         cells = cells + MOTOR
     if has_board(drive) or hil:
         cells = cells + ENCODERS[drive.encoder.kind] + CONVERTERS[drive.converters.kind] + BOARD
+    if drive.position.gear_master_counts is not None:
+        cells = cells + MASTER
     return cells
 
 

@@ -16,6 +16,8 @@ moving means over M samples make the profile smooth; the trajectory has them as 
 A profile that follows goes at the speed of the shaft, up to move_speed, and ``speed`` is the multiple of move_step
 below it.
 
+What the gear adds comes on top of the profile: neither ``room`` nor the limits know of it.
+
 Formats: way S(13,44) turns of the shaft, wraps; profile and move_step in units of M**2 * 2**-44 turns per sample, to
 which move_speed, and room in sections, are floored: a target is reached to 2**-18 turns, the LSB of a position.
 """
@@ -38,15 +40,18 @@ class Plan(NamedTuple):
     speed: int = 0  # the profile's magnitude without the rest
     stop: int = 0
     down: int = 0  # 1: backward
-    last: int = 0  # the profile, signed
+    last: int = 0  # the profile, signed, with what the gear adds
     slope: int = 0  # its difference
     change: int = 0  # the difference of that
     busy: int = 0  # a bit for each of the last sections, 1: its profile was not zero
+    went: int = 0  # 1: the last profile was not zero without the gear
 
 
 @kernel
-def planned(plan, d, follows, most, bits, gain):
-    """The plan of the next section: ``d`` the way to the target, or gone in the last section if it ``follows``."""
+def planned(plan, d, follows, most, bits, gain, geared):
+    """The plan of the next section: ``d`` the way to the target, or gone in the last section if it ``follows``;
+    ``geared``: what the gear adds to its profile.
+    """
     turns = plan.speed == 0 and (d < 0) != (plan.down == 1)
     down = 1 - plan.down if turns else plan.down
     room = wrap_s(-d if down else d, WAY_W) >> (3 * (SECTION_BITS + bits))
@@ -58,7 +63,7 @@ def planned(plan, d, follows, most, bits, gain):
     faster = plan.speed + gain <= most and (follows or plan.stop + 2 * plan.speed + gain <= room)
     as_fast = plan.speed <= most and (follows or plan.stop + plan.speed <= room)
     speed, stop, profile = plan.speed, plan.stop, 0
-    if turns and plan.busy & 1:  # a section at rest before the way back
+    if turns and plan.went:  # a section at rest before the way back
         profile = 0
     elif faster:
         stop += speed
@@ -70,7 +75,7 @@ def planned(plan, d, follows, most, bits, gain):
         speed = max(speed - gain, 0)
         stop -= speed
         profile = speed if speed > 0 else rest
-    busy = (plan.busy << 1 | (profile != 0)) & ((1 << BUSY_W) - 1)
-    last = -profile if down else profile
+    last = (-profile if down else profile) + geared
+    busy = (plan.busy << 1 | (last != 0)) & ((1 << BUSY_W) - 1)
     slope = last - plan.last
-    return Plan(speed, stop, down, last, slope, slope - plan.slope, busy)
+    return Plan(speed, stop, down, last, slope, slope - plan.slope, busy, 1 if profile else 0)

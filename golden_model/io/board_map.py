@@ -11,19 +11,20 @@ from dataclasses import replace
 
 from golden_model.block import Port
 from golden_model.converters import current_front
-from golden_model.encoders import forced_position, position_front
+from golden_model.encoders import forced_position, master_encoder, position_front
 from golden_model.formats import BIT
 from golden_model.io import board_faults, board_snapshot, register_map
 from golden_model.io.register_map import WORD, Field, Kind, Register
 
 BASE, END = 0x400, 0x600
-GENERICS = ("encoder", "currents", "spi_lines")
-BLOCKS = (position_front, forced_position, current_front, board_faults, board_snapshot)
+GENERICS = ("encoder", "currents", "spi_lines", "master")
+BLOCKS = (position_front, master_encoder, forced_position, current_front, board_faults, board_snapshot)
 
 _GENERICS = {
     "encoder": (0x400, "0 external, 1 A/B/Z, 2 Hall, 3 A/B/Z and Hall, 4 SSI, 5 BiSS-C, 6 EnDat"),
     "currents": (0x404, "0 external, 1 SPI, 2 XADC, 3 delta-sigma"),
     "spi_lines": (0x408, "data lines of the SPI converters"),
+    "master": (0x40C, "1: A/B of a second encoder, the gear's master; 0: register gear_code"),
 }
 _COMMANDS = {
     "clear_encoder": (0x410, Kind.PULSE),
@@ -38,7 +39,7 @@ _STATUS = """
     454 bridged_count    458 converter_errors                     45c converter_refused
     460 forced           464 board_flags    468 board_first       470 snap_ready       474 snap_code
     478 snap_position    47c snap_count     480 snap_flags        484 snap_adc_a       488 snap_adc_b
-    48c snap_adc_c       490 snap_adc_u_dc
+    48c snap_adc_c       490 snap_adc_u_dc  494 master_illegal
 """
 _SETTINGS = """
     500 filter_clocks    504 index_phase    508 counts            50c code_step        510 code_rest
@@ -52,7 +53,7 @@ _SETTINGS = """
     59c conversions      5a0 xadc_channels  5a4 address_0         5a8 address_1        5ac address_2
     5b0 address_3        5b4 xadc_timeout   5b8 mod_ratio         5bc mod_delay        5c0 follow_clock
     5c4 oversampling     5c8 sinc_gain      5cc start_clocks      5d0 trip_oversampling
-    5d4 limit_high       5d8 limit_low
+    5d4 limit_high       5d8 limit_low      5dc master_counts    5e0 master_step      5e4 master_rest
 """
 SETTINGS, STATUS = register_map._table(_SETTINGS), register_map._table(_STATUS)
 _LARGEST = {"k_edge": (1 << 31) - 1}  # a register fits a signed word; k_edge of real encoders is far below
@@ -81,7 +82,10 @@ def board_registers() -> list[Register]:
     for name, address in named.items():
         port = given[name]
         reset = max(port.low, min(port.high, 0))
-        found.append(Register(name, address, kinds.get(name, Kind.SETTING), (Field(name, port),), port.doc, reset))
+        needs = "master" if name.startswith("master_") else ""
+        found.append(
+            Register(name, address, kinds.get(name, Kind.SETTING), (Field(name, port),), port.doc, reset, needs)
+        )
     found += [
         Register(name, address, Kind.STATUS, (Field(name, shown[name]),), shown[name].doc)
         for name, address in STATUS.items()

@@ -40,14 +40,15 @@ def from_word(word: int) -> int:
 class RegisterFile:
     """The register map with its values; generics and version of the core as built.
 
-    ``generics``: {name: value} of all of register_map.GENERICS.
+    ``generics``: {name: value} of all of register_map.GENERICS; ``beside``: those of a board, 0 where not given.
     """
 
-    def __init__(self, generics: Mapping[str, int], version: int = 0) -> None:
+    def __init__(self, generics: Mapping[str, int], version: int = 0, beside: Mapping[str, int] | None = None) -> None:
         self.map = registers()
         self.at = {register.address: register for register in self.map.values()}
         if set(generics) != set(GENERICS):
             raise ValueError(f"generics are {', '.join(sorted(generics))}: expected {', '.join(GENERICS)}")
+        self._built = {**generics, **(beside or {})}
         self._constant = {**generics, "identification": self.map["identification"].reset, "version": version}
         self.status: dict[str, int] = {
             field.name: 0 for register in self.map.values() if register.kind is Kind.STATUS for field in register.fields
@@ -68,7 +69,7 @@ class RegisterFile:
         value = from_word(word)
         if not register.port.low <= value <= register.port.high:
             return SLVERR
-        if not register.needs or self._constant[register.needs]:
+        if not register.needs or self._built.get(register.needs, 0):
             self.values[register.name] = value
         return OKAY
 

@@ -46,6 +46,7 @@ GENERICS = (
     "residual",
     "modes",
     "overmodulation",
+    "gearing",
 )
 
 
@@ -132,11 +133,13 @@ _SETTINGS = """
     2ac stop_high     2b0 k_inertia      2b4 k_viscous      2b8 coulomb
     2bc voltage_mode  2c0 u_d_ext         2c4 u_q_ext      2c8 u_step         2cc i_step
     2d0 omega_step    2d4 k_ripple
+    2ec gear_on       2f0 gear_numerator  2f4 gear_denominator                2f8 gear_step      2fc gear_lead
+    300 gear_smooth   304 gear_code
     340 residual_min  344 residual_w     348 residual_i     34c residual_samples
     350 residual_sum_max                 354 residual_sum_i
     378 residual_leg  37c residual_light
     380 residual_slow
-"""  # 24c, 278 to 27c, 2d8 to 2dc, 2e8 to 33c, 384 to 3bc and 3f0 to 3fc are free
+"""  # 24c, 278 to 27c, 2d8 to 2dc, 308 to 33c, 384 to 3bc and 3f0 to 3fc are free
 _COMMANDS = {
     "enable": (0x040, Kind.COMMAND),
     "clear_trip": (0x044, Kind.PULSE),
@@ -165,7 +168,7 @@ _STATUS = """
     0b4 lambda_q      0b8 psi_m           0bc v_dead       0c0 v_comp
     0c8 telemetry_dropped                 0cc fault_flags      0d0 first_fault    0d4 early_samples
     0d8 irq_cause     0dc code_a          0e0 code_b           0e4 code_c         0e8 code_u_dc
-    0ec code_theta    2e0 shaft_position  2e4 position_error
+    0ec code_theta    2e0 shaft_position  2e4 position_error   2e8 gear_way
     358 residual_d     35c residual_q     360 residual_mean_d
     364 residual_mean_q                  368 residual_sixth_d                 36c residual_sixth_q
     370 residual_power                   374 residual_sum
@@ -188,6 +191,8 @@ _FLAGS = {
     "brake_asked": 14,
     "double_used": 15,
     "regen_limited": 16,
+    "gear_engaged": 17,
+    "gear_stopped": 18,
     "motor_differs": 24,
 }
 # Bits of the word "ring_state", likewise
@@ -266,6 +271,7 @@ def _read_only() -> list[Register]:
         word("residual", 0x024, Kind.GENERIC, "1: with the residual of the motor beside its description"),
         word("modes", 0x028, Kind.GENERIC, "1: with voltage mode and changes of mode without a step of the voltage"),
         word("overmodulation", 0x02C, Kind.GENERIC, "1: with fundamentals of the voltage up to six-step"),
+        word("gearing", 0x030, Kind.GENERIC, "1: with a gear to a second encoder, in the position loop"),
         Register("flags", 0x080, Kind.STATUS, flags, "status flags of the core, read together"),
         Register("ring_state", 0x3E0, Kind.STATUS, ring_state, "what the ring of telemetry does, read together"),
         *(

@@ -20,23 +20,25 @@ package position_program_pkg is
   constant LATE_V      : natural := 5;
   constant AHEAD       : natural := 6;
   constant OMEGA       : natural := 7;
-  constant WAY         : natural := 8;  -- a multiple of 8: plus_way reads X_SHAFT instead
+  constant WAY         : natural := 8;  -- plus_way reads X_SHAFT, of the same number, instead
   constant MARK        : natural := 9;
   constant GAIN        : natural := 10;
   constant SPEED       : natural := 11;
   constant STOP        : natural := 12;
   constant LAST        : natural := 13;
   constant SLOPE       : natural := 14;
+  constant GIVEN       : natural := 15;
   constant TORQUE      : natural := 16;
   constant GOAL        : natural := 17;
   constant D           : natural := 18;
   constant ROOM        : natural := 19;
   constant MOST        : natural := 20;
   constant REST        : natural := 21;
+  constant GEARED      : natural := 22;
   constant NOWHERE     : natural := 31;
 
   -- What x is
-  constant X_SHAFT   : natural := 0;
+  constant X_GEAR    : natural := 0;
   constant X_PICKED  : natural := 1;  -- the target, or the stop that is nearer
   constant X_LOW     : natural := 2;
   constant X_HIGH    : natural := 3;
@@ -44,6 +46,7 @@ package position_program_pkg is
   constant X_SPEED   : natural := 5;
   constant X_STEP    : natural := 6;
   constant X_COULOMB : natural := 7;
+  constant X_SHAFT   : natural := 8;
 
   -- What a factor, v, a or the filter's error, is multiplied by
   constant BY_INERTIA : natural := 0;
@@ -54,11 +57,11 @@ package position_program_pkg is
   type operation_t is (ADD, LEFT_3, RIGHT_3, RIGHT_2);
   type source_t is (FROM_MEMORY, FROM_X, FROM_WAY);
   type sign_t is (PLUS, MINUS, IF_DOWN, IF_NEGATIVE_V, IF_SLOWER);
-  type condition_t is (ALWAYS, AT_LEAD, ACTIVE, STILL, FOLLOWS, NEGATIVE, NOT_NEGATIVE, MOVING, FASTER, SLOWER, CHANGES,
+  type condition_t is (ALWAYS, AT_LEAD, ACTIVE, STILL, FOLLOWS, LEADS, STOPPED, NEGATIVE, NOT_NEGATIVE, MOVING, FASTER, SLOWER, CHANGES,
                        GOES, RESTS);
   type event_t is (NOTHING, LOWER_HALF, UPPER_HALF, SIGN_OF_V, POSITION_OUT,
                    TORQUE_OUT, OMEGA_OUT, PICK_HIGH, PICK_LOW, SETTINGS, TURN, SPEED_FITS, FASTER_FITS, WAY_FITS,
-                   FASTER_WAY_FITS, SPEED_ZERO, PROFILE);
+                   FASTER_WAY_FITS, SPEED_ZERO, PROFILE, WITH_GEAR);
 
   type word_t is record
     op     : operation_t;
@@ -72,11 +75,12 @@ package position_program_pkg is
     does   : event_t;
     clears : std_logic;
     loops  : std_logic;  -- repeated 3 + jerk_bits times
+    less   : std_logic;  -- or twice less
     ends   : std_logic;
   end record word_t;
   type program_t is array (0 to 127) of word_t;
 
-  constant NO_WORD : word_t := (ADD, FROM_MEMORY, (others => '0'), PLUS, (others => '1'), '0', '0', ALWAYS, NOTHING, '0', '0', '0');
+  constant NO_WORD : word_t := (ADD, FROM_MEMORY, (others => '0'), PLUS, (others => '1'), '0', '0', ALWAYS, NOTHING, '0', '0', '0', '0');
 
   -- Where the program of a sample begins, and the part of the plan that each sample of eight runs behind it
   type begins_t is array (0 to 8) of unsigned(6 downto 0);
@@ -103,7 +107,7 @@ package body position_program_pkg is
                  does : event_t; last : natural) return word_t is
     variable word : word_t := NO_WORD;
   begin
-    word := (op, from, to_unsigned(m, 5), sign, to_unsigned(put, 5), '0', '1', only, does, '0', '0', '0');
+    word := (op, from, to_unsigned(m, 5), sign, to_unsigned(put, 5), '0', '1', only, does, '0', '0', '0', '0');
     if put /= NOWHERE then
       word.puts := '1';
     end if;
@@ -122,9 +126,10 @@ package body position_program_pkg is
     return made(ADD, FROM_MEMORY, m, sign, put, only, does, 0);
   end function;
 
-  function minus_m (m : natural; only : condition_t := ALWAYS; does : event_t := NOTHING) return word_t is
+  function minus_m (m : natural; put : natural := NOWHERE; only : condition_t := ALWAYS;
+                    does : event_t := NOTHING) return word_t is
   begin
-    return made(ADD, FROM_MEMORY, m, MINUS, NOWHERE, only, does, 0);
+    return made(ADD, FROM_MEMORY, m, MINUS, put, only, does, 0);
   end function;
 
   function plus_x (x : natural; only : condition_t := ALWAYS; sign : sign_t := PLUS) return word_t is
@@ -170,6 +175,13 @@ package body position_program_pkg is
     variable word : word_t := shift(op);
   begin
     word.loops := '1';
+    return word;
+  end function;
+
+  function shifts_less (op : operation_t) return word_t is
+    variable word : word_t := shifts(op);
+  begin
+    word.less := '1';
     return word;
   end function;
 
@@ -220,72 +232,85 @@ package body position_program_pkg is
       39 => shifts(LEFT_3),
       40 => plus_m(AHEAD),
       41 => finish(AHEAD),
-      -- Part 1: the target within its stops, move_step
-      42 => plus_x(X_PICKED),
-      43 => plus_x(X_HIGH, sign => MINUS),
-      44 => clear(does => PICK_HIGH),
-      45 => plus_x(X_PICKED),
-      46 => plus_x(X_LOW, sign => MINUS),
-      47 => clear(does => PICK_LOW),
+      -- Part 1: the target and the gear's way, within the stops;  move_step
+      42 => plus_m(GIVEN),
+      43 => plus_x(X_PICKED),
+      44 => clear(GOAL),
+      45 => plus_x(X_HIGH),
+      46 => minus_m(GOAL),
+      47 => clear(does => PICK_HIGH),
       48 => plus_x(X_PICKED),
-      49 => clear(GOAL),
-      50 => plus_x(X_STEP),
-      51 => finish(GAIN, SETTINGS, STILL),
-      -- Part 2: d, the way gone or to the goal, and its direction
-      52 => plus_x(X_SHAFT),
-      53 => minus_m(MARK),
-      54 => plus_m(MARK, put => D),
-      55 => clear(MARK),
-      56 => plus_m(GOAL),
-      57 => minus_m(WAY),
-      58 => minus_m(AHEAD),
-      59 => clear(D, only => ACTIVE),
-      60 => plus_m(D),
-      61 => finish(does => TURN),
-      -- Part 3: room = d forward in sections;  part 4: move_speed in the profile's units
-      62 => plus_m(D, sign => IF_DOWN),
-      63 => shifts(RIGHT_3),
-      64 => finish(ROOM),
-      65 => plus_x(X_SPEED),
-      66 => shifts(RIGHT_2),
-      67 => finish(MOST),
+      49 => clear(GOAL, only => STOPPED),
+      50 => plus_m(GOAL),
+      51 => plus_x(X_LOW, sign => MINUS),
+      52 => clear(does => PICK_LOW),
+      53 => plus_x(X_PICKED),
+      54 => clear(GOAL, only => STOPPED),
+      55 => plus_x(X_STEP),
+      56 => finish(GAIN, SETTINGS, STILL),
+      -- Part 2: d, the way gone or to the goal, and its direction;  the gear's way since the last plan
+      57 => plus_x(X_SHAFT),
+      58 => minus_m(MARK),
+      59 => plus_m(MARK, put => D),
+      60 => clear(MARK),
+      61 => plus_m(GOAL),
+      62 => minus_m(WAY),
+      63 => minus_m(AHEAD),
+      64 => clear(D, only => ACTIVE),
+      65 => plus_m(D),
+      66 => clear(does => TURN),
+      67 => plus_x(X_GEAR, only => LEADS),
+      68 => minus_m(GIVEN, put => GIVEN),
+      69 => finish(GEARED),
+      -- Part 3: room = d forward in sections
+      70 => plus_m(D, sign => IF_DOWN),
+      71 => shifts(RIGHT_3),
+      72 => finish(ROOM),
+      -- Part 4: move_speed and the gear's way in the profile's units
+      73 => plus_x(X_SPEED),
+      74 => shifts_less(RIGHT_2),
+      75 => clear(MOST),
+      76 => plus_m(GEARED),
+      77 => shifts(RIGHT_3),
+      78 => finish(GEARED),
       -- Part 5: rest = min(room, most), which is most of a profile that follows;  is most fast enough
-      68 => plus_m(ROOM),
-      69 => minus_m(MOST),
-      70 => clear(only => NOT_NEGATIVE),
-      71 => plus_m(MOST),
-      72 => keeps(MOST, only => FOLLOWS),
-      73 => clear(only => NEGATIVE),
-      74 => clear(REST),
-      75 => plus_m(MOST),
-      76 => minus_m(SPEED),
-      77 => minus_m(GAIN, does => SPEED_FITS),
-      78 => finish(does => FASTER_FITS),
-      -- Part 6: is the room long enough;  faster: stop += speed, speed += gain;  slower: speed -= gain
       79 => plus_m(ROOM),
-      80 => minus_m(STOP),
-      81 => minus_m(SPEED),
-      82 => minus_m(SPEED, does => WAY_FITS),
-      83 => minus_m(GAIN),
-      84 => clear(does => FASTER_WAY_FITS),
-      85 => plus_m(STOP),
-      86 => plus_m(SPEED, only => FASTER),
-      87 => clear(STOP),
-      88 => plus_m(SPEED),
-      89 => plus_m(GAIN, only => CHANGES, sign => IF_SLOWER),
-      90 => clear(only => NEGATIVE),
-      91 => finish(SPEED, SPEED_ZERO),
-      -- Part 7: slower: stop -= speed;  the profile, its first and second difference
-      92  => plus_m(STOP),
-      93  => minus_m(SPEED, only => SLOWER),
-      94  => clear(STOP),
-      95  => plus_m(SPEED, only => GOES, sign => IF_DOWN),
-      96  => plus_m(REST, only => RESTS, sign => IF_DOWN),
-      97  => minus_m(LAST, does => PROFILE),
-      98  => minus_m(SLOPE),
-      99  => plus_m(SLOPE, put => CHANGE),
-      100 => plus_m(LAST, put => SLOPE),
-      101 => finish(LAST),
+      80 => minus_m(MOST),
+      81 => clear(only => NOT_NEGATIVE),
+      82 => plus_m(MOST),
+      83 => keeps(MOST, only => FOLLOWS),
+      84 => clear(only => NEGATIVE),
+      85 => clear(REST),
+      86 => plus_m(MOST),
+      87 => minus_m(SPEED),
+      88 => minus_m(GAIN, does => SPEED_FITS),
+      89 => finish(does => FASTER_FITS),
+      -- Part 6: is the room long enough;  faster: stop += speed, speed += gain;  slower: speed -= gain
+      90 => plus_m(ROOM),
+      91 => minus_m(STOP),
+      92 => minus_m(SPEED),
+      93 => minus_m(SPEED, does => WAY_FITS),
+      94 => minus_m(GAIN),
+      95 => clear(does => FASTER_WAY_FITS),
+      96 => plus_m(STOP),
+      97 => plus_m(SPEED, only => FASTER),
+      98 => clear(STOP),
+      99 => plus_m(SPEED),
+      100=> plus_m(GAIN, only => CHANGES, sign => IF_SLOWER),
+      101=> clear(only => NEGATIVE),
+      102=> finish(SPEED, SPEED_ZERO),
+      -- Part 7: slower: stop -= speed;  the profile, the gear's part;  its first and second difference
+      103=> plus_m(STOP),
+      104=> minus_m(SPEED, only => SLOWER),
+      105=> clear(STOP),
+      106=> plus_m(SPEED, only => GOES, sign => IF_DOWN),
+      107=> plus_m(REST, only => RESTS, sign => IF_DOWN),
+      108=> plus_m(GEARED, only => LEADS, does => PROFILE),
+      109=> minus_m(LAST, does => WITH_GEAR),
+      110=> minus_m(SLOPE),
+      111=> plus_m(SLOPE, put => CHANGE),
+      112=> plus_m(LAST, put => SLOPE),
+      113=> finish(LAST),
       others => NO_WORD);
   end function;
 end package body position_program_pkg;

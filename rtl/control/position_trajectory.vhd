@@ -7,10 +7,12 @@
 --   as fast  if speed             <= move_speed  and  stop + speed               <= room
 --   slower   else:  stop -= speed;  at speed zero: the rest of the way
 -- Without position_mode or run the profile follows the measured speed and position_ref the position; torque_ff is zero.
+-- The gear's way of a section is added to the profile of the next one, all of it to the target; at_stop: a stop limits
+-- that.
 -- One adder, one memory and one multiplier run the program of position_program_pkg.
 -- Formats: way S(13,44) turns, half an LSB of a position above position_ref; v and a S(-3,44); profile in units of
 --   M**2 * 2**-44 turns per sample; products of upper and lower halves, torque_ff and the filter 33 fraction bits.
--- Latency: 52.  Interval: 53.
+-- Latency: 54.  Interval: 56.
 -- Rounding: everything is floored; the filter's error, omega_ff and torque_ff saturate; the way wraps.
 
 library ieee;
@@ -26,6 +28,7 @@ entity position_trajectory is
     rst             : in  std_logic;
     in_valid        : in  std_logic;
     shaft_position  : in  signed(31 downto 0);  -- 7 clocks late
+    led             : in  signed(31 downto 0);  -- 42 clocks late
     run             : in  std_logic;
     position_mode   : in  std_logic;
     position_target : in  signed(31 downto 0);
@@ -45,7 +48,9 @@ entity position_trajectory is
     position_ref    : out signed(31 downto 0);
     omega_ff        : out signed(INTEGRAL_W - 1 downto 0);
     torque_ff       : out signed(PU_W - 1 downto 0);
-    at_rest         : out std_logic
+    at_rest         : out std_logic;
+    gear_free       : out std_logic;
+    at_stop         : out std_logic
   );
 end entity position_trajectory;
 
@@ -55,7 +60,7 @@ architecture rtl of position_trajectory is
   constant SMALL    : positive := POSITION_TRAJECTORY_SMALL;
   constant DROP     : positive := POSITION_TRAJECTORY_DROP;
   constant HALF_W   : positive := POSITION_TRAJECTORY_LOW;  -- bits of a factor's lower half
-  constant SPEED_UP : positive := POSITION_TRAJECTORY_SPEED_UP;
+  constant SPEED_UP : positive := POSITION_TRAJECTORY_SPEED_UP - 4;  -- without the two shifts that the loop lacks
   constant TO_PU    : positive := POSITION_TRAJECTORY_TO_PU;
   constant TO_INT   : positive := POSITION_TRAJECTORY_TO_INTEGRAL;
   constant WORDS    : program_t := program;
@@ -92,8 +97,9 @@ architecture rtl of position_trajectory is
   signal puts      : std_logic;
   signal moves_acc : std_logic;  -- the word changes acc
   signal x         : acc_t;
-  signal which     : unsigned(2 downto 0);
-  signal picked    : unsigned(2 downto 0);
+  signal which     : unsigned(3 downto 0);
+  signal picked    : unsigned(3 downto 0);
+  signal is_picked : std_logic;  -- a stop
 
   signal factor_x : signed(24 downto 0);
   signal factor_y : signed(17 downto 0);
@@ -109,6 +115,7 @@ architecture rtl of position_trajectory is
   signal down         : std_logic;
   signal turned       : std_logic;
   signal stands       : std_logic;  -- speed = 0
+  signal went         : std_logic;  -- the last profile was not zero without the gear
   signal busy         : unsigned(POSITION_TRAJECTORY_BUSY_W - 1 downto 0);
   signal is_still     : std_logic;
   signal fits_speed   : std_logic;
@@ -123,18 +130,21 @@ architecture rtl of position_trajectory is
 begin
   is_active  <= position_mode and run;
   is_still   <= '1' when busy = 0 else '0';
-  held       <= turned and busy(0);
+  held       <= turned and went;
   is_faster  <= fits_faster and (fits_further or is_follower) and not held;
   is_as_fast <= fits_speed and (fits_way or is_follower) and not held and not is_faster;
   is_slower  <= not (is_faster or is_as_fast or held);
   goes_speed <= is_faster or (not held and not stands and not (is_as_fast and is_follower));
-  holds      <= word.loops when count /= bits + 2 else '0';
+  holds      <= word.loops when count /= bits + unsigned'('0' & not word.less & '0') else '0';
+  is_picked  <= '1' when picked /= X_PICKED else '0';
 
   with word.only select met <=
     first and (part ?= lead)     when AT_LEAD,
     is_active                    when ACTIVE,
     is_still                     when STILL,
     is_follower                  when FOLLOWS,
+    not is_follower              when LEADS,
+    is_picked                    when STOPPED,
     below                        when NEGATIVE,
     not below                    when NOT_NEGATIVE,
     moves                        when MOVING,
@@ -147,8 +157,9 @@ begin
   puts      <= word.puts and met;
   moves_acc <= word.acts and (met or word.puts);
 
-  which <= picked when word.m(2 downto 0) = X_PICKED else word.m(2 downto 0);
+  which <= picked when word.m(3 downto 0) = X_PICKED else word.m(3 downto 0);
   with to_integer(which) select x <=
+    led & (SMALL - 1 downto 0 => '0')                        when X_GEAR,
     turns_of(shaft_position)                                 when X_SHAFT,
     turns_of(position_target)                                when X_PICKED,
     turns_of(stop_low)                                       when X_LOW,
@@ -284,15 +295,16 @@ begin
         when OMEGA_OUT =>
           omega_ff <= narrow;
         when PICK_HIGH =>
-          if use_stops = '1' and below = '0' then
-            picked <= to_unsigned(X_HIGH, 3);
+          if use_stops = '1' and below = '1' then
+            picked <= to_unsigned(X_HIGH, 4);
           end if;
         when PICK_LOW =>
           if use_stops = '1' and below = '1' then
-            picked <= to_unsigned(X_LOW, 3);
+            picked <= to_unsigned(X_LOW, 4);
           end if;
         when SETTINGS =>
-          picked <= to_unsigned(X_PICKED, 3);
+          at_stop <= is_picked and not is_follower;
+          picked  <= to_unsigned(X_PICKED, 4);
           if is_still = '1' then
             bits <= jerk_bits;
             lead <= torque_lead;
@@ -306,7 +318,8 @@ begin
         when WAY_FITS        => fits_way     <= not below;
         when FASTER_WAY_FITS => fits_further <= not below;
         when SPEED_ZERO      => stands       <= '1' when acc = 0 else '0';
-        when PROFILE =>
+        when PROFILE => went <= '1' when acc /= 0 else '0';
+        when WITH_GEAR =>
           busy    <= shift_left(busy, 1);
           busy(0) <= '1' when acc /= 0 else '0';
         when others          => null;
@@ -337,15 +350,20 @@ begin
         bits      <= (others => '0');
         lead      <= (others => '0');
         written   <= (others => '0');
-        picked    <= to_unsigned(X_PICKED, 3);
+        picked    <= to_unsigned(X_PICKED, 4);
         goes_on   <= '0';
         down      <= '0';
         stands    <= '1';
+        went      <= '0';
         busy      <= (others => '0');
+        at_stop   <= '0';
+
+        is_follower <= '1';
       end if;
     end if;
   end process;
 
-  at_rest <= is_still;
+  at_rest   <= is_still;
+  gear_free <= is_follower;
 
 end architecture rtl;

@@ -31,9 +31,11 @@ entity board_register_file is
     RESIDUAL       : natural := 0;
     MODES          : natural := 0;
     OVERMODULATION : natural := 0;
+    GEARING        : natural := 0;
     ENCODER        : natural := 1;
     CURRENTS       : natural := 1;
-    SPI_LINES      : natural := 4
+    SPI_LINES      : natural := 4;
+    MASTER         : natural := 0
   );
   port (
     clk               : in  std_logic;
@@ -141,6 +143,9 @@ entity board_register_file is
     trip_oversampling : out unsigned(5 downto 0);  -- 5d0 bits from total to total of the fast overcurrent
     limit_high        : out unsigned(15 downto 0);  -- 5d4 total that trips, and above
     limit_low         : out unsigned(15 downto 0);  -- 5d8 total that trips, and below
+    master_counts     : out unsigned(18 downto 0);  -- 5dc counts a turn of the master, four for each line
+    master_step       : out unsigned(16 downto 0);  -- 5e0 2**18 / master_counts, whole part
+    master_rest       : out unsigned(17 downto 0);  -- 5e4 2**18 / master_counts, remainder
     running           : in  std_logic;  -- 080 gates are switching
     tripped           : in  std_logic;  -- 080 1: a trip is latched
     setting_refused   : in  std_logic;  -- 080 1: dead_time and min_pulse contradict each other, refused
@@ -177,7 +182,8 @@ entity board_register_file is
     snap_adc_a        : in  unsigned(15 downto 0);  -- 484 snapshot: ADC code, a, right-aligned
     snap_adc_b        : in  unsigned(15 downto 0);  -- 488 snapshot: ADC code, b, right-aligned
     snap_adc_c        : in  unsigned(15 downto 0);  -- 48c snapshot: ADC code, c, right-aligned
-    snap_adc_u_dc     : in  unsigned(15 downto 0)  -- 490 snapshot: ADC code, u_dc, right-aligned
+    snap_adc_u_dc     : in  unsigned(15 downto 0);  -- 490 snapshot: ADC code, u_dc, right-aligned
+    master_illegal    : in  unsigned(11 downto 0)  -- 494 illegal transitions of the master's A and B, saturates
   );
 end entity board_register_file;
 
@@ -825,6 +831,34 @@ begin
         settings.k_ripple <= signed(held(17 downto 0));
         written(181)      <= '1';
       end if;
+      if GEARING = 1 and (row(23) and column(3) and not sample_busy) = '1' then
+        settings.gear_on <= held(0);
+        written(187)     <= '1';
+      end if;
+      if GEARING = 1 and (row(23) and column(4) and not sample_busy) = '1' then
+        settings.gear_numerator <= signed(held(15 downto 0));
+        written(188)            <= '1';
+      end if;
+      if GEARING = 1 and (row(23) and column(5) and not sample_busy) = '1' then
+        settings.gear_denominator <= unsigned(held(15 downto 0));
+        written(189)              <= '1';
+      end if;
+      if GEARING = 1 and (row(23) and column(6) and not sample_busy) = '1' then
+        settings.gear_step <= unsigned(held(24 downto 0));
+        written(190)       <= '1';
+      end if;
+      if GEARING = 1 and (row(23) and column(7) and not sample_busy) = '1' then
+        settings.gear_lead <= unsigned(held(9 downto 0));
+        written(191)       <= '1';
+      end if;
+      if GEARING = 1 and (row(24) and column(0) and not sample_busy) = '1' then
+        settings.gear_smooth <= unsigned(held(3 downto 0));
+        written(192)         <= '1';
+      end if;
+      if GEARING = 1 and (row(24) and column(1) and not sample_busy) = '1' then
+        settings.gear_code <= unsigned(held(17 downto 0));
+        written(193)       <= '1';
+      end if;
       if RESIDUAL = 1 and (row(26) and column(0) and not sample_busy) = '1' then
         settings.residual_min <= unsigned(held(16 downto 0));
         written(208)          <= '1';
@@ -1133,6 +1167,18 @@ begin
         limit_low    <= unsigned(held(15 downto 0));
         written(374) <= '1';
       end if;
+      if MASTER = 1 and (row(46) and column(7) and not sample_busy) = '1' then
+        master_counts <= unsigned(held(18 downto 0));
+        written(375)  <= '1';
+      end if;
+      if MASTER = 1 and (row(47) and column(0) and not sample_busy) = '1' then
+        master_step  <= unsigned(held(16 downto 0));
+        written(376) <= '1';
+      end if;
+      if MASTER = 1 and (row(47) and column(1) and not sample_busy) = '1' then
+        master_rest  <= unsigned(held(17 downto 0));
+        written(377) <= '1';
+      end if;
 
       if rst = '1' then
         written                   <= (others => '0');
@@ -1265,6 +1311,13 @@ begin
         settings.i_step           <= (others => '0');
         settings.omega_step       <= to_signed(1, 18);
         settings.k_ripple         <= (others => '0');
+        settings.gear_on          <= '0';
+        settings.gear_numerator   <= (others => '0');
+        settings.gear_denominator <= to_unsigned(1, 16);
+        settings.gear_step        <= to_unsigned(1, 25);
+        settings.gear_lead        <= (others => '0');
+        settings.gear_smooth      <= (others => '0');
+        settings.gear_code        <= (others => '0');
         settings.residual_min     <= (others => '0');
         settings.residual_w       <= (others => '0');
         settings.residual_i       <= (others => '0');
@@ -1343,6 +1396,9 @@ begin
         trip_oversampling         <= to_unsigned(8, 6);
         limit_high                <= (others => '0');
         limit_low                 <= (others => '0');
+        master_counts             <= (others => '0');
+        master_step               <= (others => '0');
+        master_rest               <= (others => '0');
       end if;
     end if;
   end process;
@@ -1491,15 +1547,17 @@ begin
   shown(9)          <= std_logic_vector(to_unsigned(RESIDUAL, 32));
   shown(10)         <= std_logic_vector(to_unsigned(MODES, 32));
   shown(11)         <= std_logic_vector(to_unsigned(OVERMODULATION, 32));
-  shown(12 to 16)   <= (others => (others => '0'));
+  shown(12)         <= std_logic_vector(to_unsigned(GEARING, 32));
+  shown(13 to 16)   <= (others => (others => '0'));
   shown(17)         <= "0000000000000000000000000000000" & clear_trip;
   shown(18)         <= "0000000000000000000000000000000" & clear_faults_in;
   shown(19 to 26)   <= (others => (others => '0'));
   shown(27)         <= std_logic_vector(resize(irq_clear, 32));
   shown(28 to 31)   <= (others => (others => '0'));
-  shown(32)         <= "0000000" & estimated.motor_differs & "0000000" & observed.regen_limited & double_used &
-                       observed.brake_asked & estimated.delta_held & estimated.merge_known & estimated.temp_lost &
-                       estimated.psi_held & estimated.v_comp_limited & observed.speed_limited & observed.u_dc_low &
+  shown(32)         <= "0000000" & estimated.motor_differs & "00000" & observed.gear_stopped &
+                       observed.gear_engaged & observed.regen_limited & double_used & observed.brake_asked &
+                       estimated.delta_held & estimated.merge_known & estimated.temp_lost & estimated.psi_held &
+                       estimated.v_comp_limited & observed.speed_limited & observed.u_dc_low &
                        observed.u_dc_at_rail & std_logic_vector(observed.current_at_rail) & setting_refused &
                        tripped & running;
   shown(33)         <= std_logic_vector(resize(estimated.flux_faults, 32));
@@ -1539,7 +1597,11 @@ begin
   shown(181 to 183) <= (others => (others => '0'));
   shown(184)        <= "" & std_logic_vector(resize(observed.shaft_position, 32));
   shown(185)        <= "" & std_logic_vector(resize(observed.position_error, 32));
-  shown(186 to 213) <= (others => (others => '0'));
+  shown(186)        <= "" & std_logic_vector(resize(observed.gear_way, 32));
+  shown(187 to 188) <= (others => (others => '0'));
+  shown(189)        <= x"00000001";
+  shown(190)        <= x"00000001";
+  shown(191 to 213) <= (others => (others => '0'));
   shown(214)        <= "" & std_logic_vector(resize(estimated.residual_d, 32));
   shown(215)        <= "" & std_logic_vector(resize(estimated.residual_q, 32));
   shown(216)        <= "" & std_logic_vector(resize(estimated.residual_mean_d, 32));
@@ -1561,7 +1623,7 @@ begin
   shown(256)        <= std_logic_vector(to_unsigned(ENCODER, 32));
   shown(257)        <= std_logic_vector(to_unsigned(CURRENTS, 32));
   shown(258)        <= std_logic_vector(to_unsigned(SPI_LINES, 32));
-  shown(259 to 259) <= (others => (others => '0'));
+  shown(259)        <= std_logic_vector(to_unsigned(MASTER, 32));
   shown(260)        <= "0000000000000000000000000000000" & clear_encoder;
   shown(261)        <= "0000000000000000000000000000000" & take_snapshot;
   shown(262 to 271) <= (others => (others => '0'));
@@ -1586,7 +1648,8 @@ begin
   shown(290)        <= std_logic_vector(resize(snap_adc_b, 32));
   shown(291)        <= std_logic_vector(resize(snap_adc_c, 32));
   shown(292)        <= std_logic_vector(resize(snap_adc_u_dc, 32));
-  shown(293 to 358) <= (others => (others => '0'));
+  shown(293)        <= std_logic_vector(resize(master_illegal, 32));
+  shown(294 to 358) <= (others => (others => '0'));
   shown(359)        <= x"00000001";
   shown(360)        <= x"00000001";
   shown(361 to 365) <= (others => (others => '0'));

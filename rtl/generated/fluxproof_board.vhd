@@ -4,6 +4,7 @@
 -- Purpose: a whole drive behind the pins of a board: encoder and converters in front of the core, one AXI4-Lite slave
 -- for the registers of all, telemetry over AXI4-Stream, gates.  This top only instantiates.
 -- ENCODER: 0 external code, 1 A/B/Z, 2 Hall, 3 A/B/Z started by Hall, 4 SSI, 5 BiSS-C, 6 EnDat.
+-- MASTER: 1 A/B of a second encoder for the core's gear (GEARING = 1).
 -- CURRENTS: 0 external codes, 1 SPI, 2 XADC, 3 delta-sigma.  Pins of a front end that is left out are ignored, tie them
 -- to 0; docs/board.md says how to set the others.
 -- Clock and reset: as fluxproof_axi.  Asynchronous are trip, the pins of encoders, miso, busy (of SPI converters),
@@ -32,6 +33,7 @@ entity fluxproof_board is
     RESIDUAL       : integer range 0 to 1         := 0;  -- 1 compares the motor with its description
     MODES          : integer range 0 to 1         := 0;  -- 1 builds voltage mode and changes of mode without a step
     OVERMODULATION : integer range 0 to 1         := 0;  -- 1 lets the fundamental of the voltage go up to six-step
+    GEARING        : integer range 0 to 1         := 0;  -- 1 builds the gear to a second encoder, with the position loop
     RING_ROWS      : integer range 0 to 2730      := 0;  -- telemetry rows of the ring, 42 in a block RAM; 0 leaves it out
     GATE_ACTIVE    : integer range 0 to 1         := 1;  -- level of gate_high and gate_low at which a switch is on
     TRIP_ACTIVE    : integer range 0 to 1         := 1;  -- level of trip that turns the gates off
@@ -39,7 +41,8 @@ entity fluxproof_board is
     TRIP_FILTER    : integer range 0 to 1023      := 0;  -- longest pulse of trip without effect, clocks; 0: every pulse acts
     ENCODER        : integer range 0 to 6         := 1;  -- the kind of encoder, see above
     CURRENTS       : integer range 0 to 3         := 1;  -- the kind of converter, see above
-    SPI_LINES      : integer range 1 to 4         := 4  -- data lines of the SPI converters
+    SPI_LINES      : integer range 1 to 4         := 4;  -- data lines of the SPI converters
+    MASTER         : integer range 0 to 1         := 0  -- 1 builds the pins of a second encoder, the gear's master
   );
   port (
     aclk           : in  std_logic;  -- the one clock
@@ -71,6 +74,8 @@ entity fluxproof_board is
     pin_a          : in  std_logic;  -- incremental encoder
     pin_b          : in  std_logic;
     pin_z          : in  std_logic;
+    master_a       : in  std_logic;  -- second encoder, the gear's master
+    master_b       : in  std_logic;
     hall_a         : in  std_logic;  -- Hall sensors
     hall_b         : in  std_logic;
     hall_c         : in  std_logic;
@@ -191,6 +196,9 @@ architecture rtl of fluxproof_board is
   signal trip_oversampling : unsigned(5 downto 0);
   signal limit_high        : unsigned(15 downto 0);
   signal limit_low         : unsigned(15 downto 0);
+  signal master_counts     : unsigned(18 downto 0);
+  signal master_step       : unsigned(16 downto 0);
+  signal master_rest       : unsigned(17 downto 0);
   signal gate_high_next    : unsigned(2 downto 0);
   signal gate_low_next     : unsigned(2 downto 0);
   signal trigger_next      : std_logic;
@@ -233,6 +241,8 @@ architecture rtl of fluxproof_board is
   signal position_lost     : std_logic;
   signal angle_unknown     : std_logic;
   signal hall_wrong        : std_logic;
+  signal master_code       : unsigned(TURN_W - 1 downto 0);
+  signal master_illegal    : unsigned(11 downto 0);
   signal position_code     : unsigned(POSITION_BITS - 1 downto 0);
   signal position_restart  : std_logic;
   signal speed_now         : std_logic;
@@ -288,13 +298,16 @@ begin
   sample.clear_faults  <= clear_faults_in;
 
   -- What the front ends know better than a register
-  process (settings, omega_now, speed_now, position_restart, forced)
+  process (settings, omega_now, speed_now, position_restart, forced, master_code)
     variable given : settings_t;
   begin
     given                  := settings;
     given.omega_given      := omega_now;
     given.speed_given      := speed_now;
     given.position_restart := settings.position_restart or position_restart;
+    if MASTER = 1 then
+      given.gear_code        := master_code;
+    end if;
     if forced = '1' then
       given.emf_samples      := (others => '0');
       given.residual_samples := (others => '0');
@@ -318,9 +331,11 @@ begin
       RESIDUAL       => RESIDUAL,
       MODES          => MODES,
       OVERMODULATION => OVERMODULATION,
+      GEARING        => GEARING,
       ENCODER        => ENCODER,
       CURRENTS       => CURRENTS,
-      SPI_LINES      => SPI_LINES
+      SPI_LINES      => SPI_LINES,
+      MASTER         => MASTER
     )
     port map (
       clk               => aclk,
@@ -428,6 +443,9 @@ begin
       trip_oversampling => trip_oversampling,
       limit_high        => limit_high,
       limit_low         => limit_low,
+      master_counts     => master_counts,
+      master_step       => master_step,
+      master_rest       => master_rest,
       running           => running,
       tripped           => tripped,
       setting_refused   => setting_refused,
@@ -464,7 +482,8 @@ begin
       snap_adc_a        => snap_adc_a,
       snap_adc_b        => snap_adc_b,
       snap_adc_c        => snap_adc_c,
-      snap_adc_u_dc     => snap_adc_u_dc
+      snap_adc_u_dc     => snap_adc_u_dc,
+      master_illegal    => master_illegal
     );
 
   core : entity work.fluxproof
@@ -477,7 +496,8 @@ begin
       POSITION_LOOP  => POSITION_LOOP,
       RESIDUAL       => RESIDUAL,
       MODES          => MODES,
-      OVERMODULATION => OVERMODULATION
+      OVERMODULATION => OVERMODULATION,
+      GEARING        => GEARING
     )
     port map (
       clk             => aclk,
@@ -661,6 +681,25 @@ begin
       serial_clock    => serial_clock,
       serial_out      => serial_out,
       serial_drive    => serial_drive
+    );
+
+  master_pins : entity work.master_encoder
+    generic map (
+      MASTER => MASTER
+    )
+    port map (
+      clk            => aclk,
+      rst            => rst,
+      master_a       => master_a,
+      master_b       => master_b,
+      sample_trigger => trigger_next,
+      clear_encoder  => clear_encoder,
+      filter_clocks  => filter_clocks,
+      master_counts  => master_counts,
+      master_step    => master_step,
+      master_rest    => master_rest,
+      master_code    => master_code,
+      master_illegal => master_illegal
     );
 
   forcing : entity work.forced_position

@@ -27,6 +27,7 @@ entity fluxproof_hil is
     RESIDUAL       : integer range 0 to 1         := 0;  -- 1 compares the motor with its description
     MODES          : integer range 0 to 1         := 0;  -- 1 builds voltage mode and changes of mode without a step
     OVERMODULATION : integer range 0 to 1         := 0;  -- 1 lets the fundamental of the voltage go up to six-step
+    GEARING        : integer range 0 to 1         := 0;  -- 1 builds the gear to a second encoder, with the position loop
     RING_ROWS      : integer range 0 to 2730      := 0;  -- telemetry rows of the ring, 42 in a block RAM; 0 leaves it out
     GATE_ACTIVE    : integer range 0 to 1         := 1;  -- level of gate_high and gate_low at which a switch is on
     TRIP_ACTIVE    : integer range 0 to 1         := 1;  -- level of trip that turns the gates off
@@ -35,6 +36,7 @@ entity fluxproof_hil is
     ENCODER        : integer range 0 to 3         := 0;  -- the kind of encoder, see above
     CURRENTS       : integer range 0 to 0         := 0;  -- codes
     SPI_LINES      : integer range 1 to 1         := 1;  -- none is used
+    MASTER         : integer range 0 to 0         := 0;  -- none is here; a host can write gear_code
     TEMPERATURES   : integer range 0 to 1         := 1  -- 0 leaves the temperatures out: hot is as cold
   );
   port (
@@ -158,6 +160,9 @@ architecture rtl of fluxproof_hil is
   signal trip_oversampling   : unsigned(5 downto 0);
   signal limit_high          : unsigned(15 downto 0);
   signal limit_low           : unsigned(15 downto 0);
+  signal master_counts       : unsigned(18 downto 0);
+  signal master_step         : unsigned(16 downto 0);
+  signal master_rest         : unsigned(17 downto 0);
   signal motor_u_dc          : signed(23 downto 0);
   signal motor_load          : signed(24 downto 0);
   signal motor_start         : std_logic;
@@ -250,6 +255,8 @@ architecture rtl of fluxproof_hil is
   signal position_lost       : std_logic;
   signal angle_unknown       : std_logic;
   signal hall_wrong          : std_logic;
+  signal master_code         : unsigned(TURN_W - 1 downto 0);
+  signal master_illegal      : unsigned(11 downto 0);
   signal position_code       : unsigned(POSITION_BITS - 1 downto 0);
   signal position_restart    : std_logic;
   signal speed_now           : std_logic;
@@ -304,6 +311,8 @@ architecture rtl of fluxproof_hil is
   signal core_settings       : settings_t;
   signal core_trip           : std_logic;
   signal motor_differs       : std_logic;
+  signal master_a            : std_logic;
+  signal master_b            : std_logic;
   signal serial_data         : std_logic;
   signal busy                : std_logic;
   signal eoc                 : std_logic;
@@ -336,13 +345,16 @@ begin
   sample.clear_faults  <= clear_faults_in;
 
   -- What the front ends know better than a register
-  process (settings, omega_now, speed_now, position_restart, forced)
+  process (settings, omega_now, speed_now, position_restart, forced, master_code)
     variable given : settings_t;
   begin
     given                  := settings;
     given.omega_given      := omega_now;
     given.speed_given      := speed_now;
     given.position_restart := settings.position_restart or position_restart;
+    if MASTER = 1 then
+      given.gear_code        := master_code;
+    end if;
     if forced = '1' then
       given.emf_samples      := (others => '0');
       given.residual_samples := (others => '0');
@@ -355,6 +367,8 @@ begin
   motor_differs <= estimated.motor_differs;
 
   -- Pins of front ends that are not here
+  master_a     <= '0';
+  master_b     <= '0';
   serial_data  <= '0';
   busy         <= '0';
   eoc          <= '0';
@@ -376,9 +390,11 @@ begin
       RESIDUAL       => RESIDUAL,
       MODES          => MODES,
       OVERMODULATION => OVERMODULATION,
+      GEARING        => GEARING,
       ENCODER        => ENCODER,
       CURRENTS       => CURRENTS,
-      SPI_LINES      => SPI_LINES
+      SPI_LINES      => SPI_LINES,
+      MASTER         => MASTER
     )
     port map (
       clk                 => aclk,
@@ -486,6 +502,9 @@ begin
       trip_oversampling   => trip_oversampling,
       limit_high          => limit_high,
       limit_low           => limit_low,
+      master_counts       => master_counts,
+      master_step         => master_step,
+      master_rest         => master_rest,
       motor_u_dc          => motor_u_dc,
       motor_load          => motor_load,
       motor_start         => motor_start,
@@ -573,6 +592,7 @@ begin
       snap_adc_b          => snap_adc_b,
       snap_adc_c          => snap_adc_c,
       snap_adc_u_dc       => snap_adc_u_dc,
+      master_illegal      => master_illegal,
       motor_i_a           => motor_i_a,
       motor_i_b           => motor_i_b,
       motor_i_c           => motor_i_c,
@@ -597,7 +617,8 @@ begin
       POSITION_LOOP  => POSITION_LOOP,
       RESIDUAL       => RESIDUAL,
       MODES          => MODES,
-      OVERMODULATION => OVERMODULATION
+      OVERMODULATION => OVERMODULATION,
+      GEARING        => GEARING
     )
     port map (
       clk             => aclk,
@@ -781,6 +802,25 @@ begin
       serial_clock    => open,
       serial_out      => open,
       serial_drive    => open
+    );
+
+  master_pins : entity work.master_encoder
+    generic map (
+      MASTER => MASTER
+    )
+    port map (
+      clk            => aclk,
+      rst            => rst,
+      master_a       => master_a,
+      master_b       => master_b,
+      sample_trigger => trigger_next,
+      clear_encoder  => clear_encoder,
+      filter_clocks  => filter_clocks,
+      master_counts  => master_counts,
+      master_step    => master_step,
+      master_rest    => master_rest,
+      master_code    => master_code,
+      master_illegal => master_illegal
     );
 
   forcing : entity work.forced_position

@@ -95,6 +95,13 @@ package fluxproof_pkg is
     position_kp      : unsigned(KP_W - 1 downto 0);  -- speed per turn of position error
     position_band    : unsigned(15 downto 0);  -- largest position error that is left at rest
     omega_most       : signed(PU_W - 1 downto 0);  -- largest speed reference of the position regulator
+    gear_code        : unsigned(TURN_W - 1 downto 0);  -- position code of the master, left-aligned; its front end sets it for each sample
+    gear_on          : std_logic;  -- 1: position mode follows the master
+    gear_numerator   : signed(15 downto 0);  -- turns of this shaft in gear_denominator turns of the master
+    gear_denominator : unsigned(15 downto 0);  -- turns of the master
+    gear_step        : unsigned(24 downto 0);  -- largest change of the numerator in force in a sample
+    gear_lead        : unsigned(9 downto 0);  -- samples by which the way is ahead at the master's mean speed
+    gear_smooth      : unsigned(3 downto 0);  -- that speed is a mean of 2**gear_smooth samples
     position_target  : signed(31 downto 0);  -- position to go to, turns of the shaft
     move_speed       : unsigned(30 downto 0);  -- largest speed of the trajectory, turns per sample
     move_step        : unsigned(30 downto 0);  -- largest change of its speed in 8*2**jerk_bits samples
@@ -240,6 +247,9 @@ package fluxproof_pkg is
     position_restarted : std_logic;  -- 1: the code of this sample had nothing to do with the one before
     shaft_position     : signed(31 downto 0);  -- position, turns of the shaft
     position_error     : signed(V_LEG_W - 1 downto 0);  -- following error, turns of the shaft
+    gear_way           : signed(31 downto 0);  -- way that the gear asks for since position mode began, turns of the shaft
+    gear_engaged       : std_logic;  -- 1: the gear has its ratio
+    gear_stopped       : std_logic;  -- 1: a soft end stop ended the gear; gear_on = 0 clears it
     code_a             : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase a
     code_b             : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase b
     code_c             : unsigned(CODE_W - 1 downto 0);  -- ADC code, phase c
@@ -454,6 +464,17 @@ package fluxproof_pkg is
   constant FLUX_LIMIT_DROP_REACH : natural := 17;
   constant FLUX_LIMIT_DIVIDEND_W : natural := 24;
 
+  -- gear: none: docs/position.md
+  constant GEAR_LATENCY : positive := 42;
+  constant GEAR_PART : natural := 9;
+  constant GEAR_ACTING_W : natural := 25;
+  constant GEAR_REST_W : natural := 25;
+  constant GEAR_CHANGE_W : natural := 16;
+  constant GEAR_SMOOTH_MOST : natural := 12;
+  constant GEAR_SPEED_UP : natural := 21;
+  constant GEAR_X_W : natural := 43;
+  constant GEAR_DIGITS : natural := 33;
+
   -- mode_change: none: docs/modes.md
   constant MODE_CHANGE_LATENCY : positive := 1;
   constant MODE_CHANGE_MODE_W : natural := 2;
@@ -473,7 +494,7 @@ package fluxproof_pkg is
   constant POSITION_CONTROL_ERROR_W : natural := 18;
 
   -- position_trajectory: none: docs/position.md
-  constant POSITION_TRAJECTORY_LATENCY : positive := 52;
+  constant POSITION_TRAJECTORY_LATENCY : positive := 54;
   constant POSITION_TRAJECTORY_WAY_W : natural := 58;
   constant POSITION_TRAJECTORY_SMALL : natural := 26;
   constant POSITION_TRAJECTORY_BUSY_W : natural := 4;
@@ -1126,6 +1147,9 @@ package fluxproof_pkg is
   -- line_timer: none: speed by the time over whole lines
   constant LINE_TIMER_LATENCY : positive := 1;
   constant LINE_TIMER_SPAN_MORE : natural := 2;
+
+  -- master_encoder: none: incremental encoder
+  constant MASTER_ENCODER_LATENCY : positive := 1;
 
   -- position_bridge: none: absolute encoders
   constant POSITION_BRIDGE_LATENCY : positive := 1;

@@ -30,7 +30,8 @@ entity register_file is
     POSITION_LOOP  : natural := 0;
     RESIDUAL       : natural := 0;
     MODES          : natural := 0;
-    OVERMODULATION : natural := 0
+    OVERMODULATION : natural := 0;
+    GEARING        : natural := 0
   );
   port (
     clk               : in  std_logic;
@@ -739,6 +740,34 @@ begin
         settings.k_ripple <= signed(held(17 downto 0));
         written(181)      <= '1';
       end if;
+      if GEARING = 1 and (row(23) and column(3) and not sample_busy) = '1' then
+        settings.gear_on <= held(0);
+        written(187)     <= '1';
+      end if;
+      if GEARING = 1 and (row(23) and column(4) and not sample_busy) = '1' then
+        settings.gear_numerator <= signed(held(15 downto 0));
+        written(188)            <= '1';
+      end if;
+      if GEARING = 1 and (row(23) and column(5) and not sample_busy) = '1' then
+        settings.gear_denominator <= unsigned(held(15 downto 0));
+        written(189)              <= '1';
+      end if;
+      if GEARING = 1 and (row(23) and column(6) and not sample_busy) = '1' then
+        settings.gear_step <= unsigned(held(24 downto 0));
+        written(190)       <= '1';
+      end if;
+      if GEARING = 1 and (row(23) and column(7) and not sample_busy) = '1' then
+        settings.gear_lead <= unsigned(held(9 downto 0));
+        written(191)       <= '1';
+      end if;
+      if GEARING = 1 and (row(24) and column(0) and not sample_busy) = '1' then
+        settings.gear_smooth <= unsigned(held(3 downto 0));
+        written(192)         <= '1';
+      end if;
+      if GEARING = 1 and (row(24) and column(1) and not sample_busy) = '1' then
+        settings.gear_code <= unsigned(held(17 downto 0));
+        written(193)       <= '1';
+      end if;
       if RESIDUAL = 1 and (row(26) and column(0) and not sample_busy) = '1' then
         settings.residual_min <= unsigned(held(16 downto 0));
         written(208)          <= '1';
@@ -937,6 +966,13 @@ begin
         settings.i_step           <= (others => '0');
         settings.omega_step       <= to_signed(1, 18);
         settings.k_ripple         <= (others => '0');
+        settings.gear_on          <= '0';
+        settings.gear_numerator   <= (others => '0');
+        settings.gear_denominator <= to_unsigned(1, 16);
+        settings.gear_step        <= to_unsigned(1, 25);
+        settings.gear_lead        <= (others => '0');
+        settings.gear_smooth      <= (others => '0');
+        settings.gear_code        <= (others => '0');
         settings.residual_min     <= (others => '0');
         settings.residual_w       <= (others => '0');
         settings.residual_i       <= (others => '0');
@@ -1102,15 +1138,17 @@ begin
   shown(9)          <= std_logic_vector(to_unsigned(RESIDUAL, 32));
   shown(10)         <= std_logic_vector(to_unsigned(MODES, 32));
   shown(11)         <= std_logic_vector(to_unsigned(OVERMODULATION, 32));
-  shown(12 to 16)   <= (others => (others => '0'));
+  shown(12)         <= std_logic_vector(to_unsigned(GEARING, 32));
+  shown(13 to 16)   <= (others => (others => '0'));
   shown(17)         <= "0000000000000000000000000000000" & clear_trip;
   shown(18)         <= "0000000000000000000000000000000" & clear_faults_in;
   shown(19 to 26)   <= (others => (others => '0'));
   shown(27)         <= std_logic_vector(resize(irq_clear, 32));
   shown(28 to 31)   <= (others => (others => '0'));
-  shown(32)         <= "0000000" & estimated.motor_differs & "0000000" & observed.regen_limited & double_used &
-                       observed.brake_asked & estimated.delta_held & estimated.merge_known & estimated.temp_lost &
-                       estimated.psi_held & estimated.v_comp_limited & observed.speed_limited & observed.u_dc_low &
+  shown(32)         <= "0000000" & estimated.motor_differs & "00000" & observed.gear_stopped &
+                       observed.gear_engaged & observed.regen_limited & double_used & observed.brake_asked &
+                       estimated.delta_held & estimated.merge_known & estimated.temp_lost & estimated.psi_held &
+                       estimated.v_comp_limited & observed.speed_limited & observed.u_dc_low &
                        observed.u_dc_at_rail & std_logic_vector(observed.current_at_rail) & setting_refused &
                        tripped & running;
   shown(33)         <= std_logic_vector(resize(estimated.flux_faults, 32));
@@ -1150,7 +1188,11 @@ begin
   shown(181 to 183) <= (others => (others => '0'));
   shown(184)        <= "" & std_logic_vector(resize(observed.shaft_position, 32));
   shown(185)        <= "" & std_logic_vector(resize(observed.position_error, 32));
-  shown(186 to 213) <= (others => (others => '0'));
+  shown(186)        <= "" & std_logic_vector(resize(observed.gear_way, 32));
+  shown(187 to 188) <= (others => (others => '0'));
+  shown(189)        <= x"00000001";
+  shown(190)        <= x"00000001";
+  shown(191 to 213) <= (others => (others => '0'));
   shown(214)        <= "" & std_logic_vector(resize(estimated.residual_d, 32));
   shown(215)        <= "" & std_logic_vector(resize(estimated.residual_q, 32));
   shown(216)        <= "" & std_logic_vector(resize(estimated.residual_mean_d, 32));

@@ -52,6 +52,7 @@ GENERICS = {
     "RESIDUAL": ("integer range 0 to 1", 0, "1 compares the motor with its description"),
     "MODES": ("integer range 0 to 1", 0, "1 builds voltage mode and changes of mode without a step"),
     "OVERMODULATION": ("integer range 0 to 1", 0, "1 lets the fundamental of the voltage go up to six-step"),
+    "GEARING": ("integer range 0 to 1", 0, "1 builds the gear to a second encoder, with the position loop"),
     "RING_ROWS": ("integer range 0 to 2730", 0, "telemetry rows of the ring, 42 in a block RAM; 0 leaves it out"),
     "GATE_ACTIVE": ("integer range 0 to 1", 1, "level of gate_high and gate_low at which a switch is on"),
     "TRIP_ACTIVE": ("integer range 0 to 1", 1, "level of trip that turns the gates off"),

@@ -13,6 +13,7 @@ HEADER = """\
 -- Purpose: a whole drive behind the pins of a board: encoder and converters in front of the core, one AXI4-Lite slave
 -- for the registers of all, telemetry over AXI4-Stream, gates.  This top only instantiates.
 -- ENCODER: 0 external code, 1 A/B/Z, 2 Hall, 3 A/B/Z started by Hall, 4 SSI, 5 BiSS-C, 6 EnDat.
+-- MASTER: 1 A/B of a second encoder for the core's gear (GEARING = 1).
 -- CURRENTS: 0 external codes, 1 SPI, 2 XADC, 3 delta-sigma.  Pins of a front end that is left out are ignored, tie them
 -- to 0; docs/board.md says how to set the others.
 -- Clock and reset: as fluxproof_axi.  Asynchronous are trip, the pins of encoders, miso, busy (of SPI converters),
@@ -31,6 +32,8 @@ _FRONT = (
     ("pin_a", "in", None, "incremental encoder"),
     ("pin_b", "in", None, ""),
     ("pin_z", "in", None, ""),
+    ("master_a", "in", None, "second encoder, the gear's master"),
+    ("master_b", "in", None, ""),
     ("hall_a", "in", None, "Hall sensors"),
     ("hall_b", "in", None, ""),
     ("hall_c", "in", None, ""),
@@ -70,13 +73,16 @@ def _pins():
 LINES = (
     "",
     "  -- What the front ends know better than a register",
-    "  process (settings, omega_now, speed_now, position_restart, forced)",
+    "  process (settings, omega_now, speed_now, position_restart, forced, master_code)",
     "    variable given : settings_t;",
     "  begin",
     "    given                  := settings;",
     "    given.omega_given      := omega_now;",
     "    given.speed_given      := speed_now;",
     "    given.position_restart := settings.position_restart or position_restart;",
+    "    if MASTER = 1 then",
+    "      given.gear_code        := master_code;",
+    "    end if;",
     "    if forced = '1' then",
     "      given.emf_samples      := (others => '0');",
     "      given.residual_samples := (others => '0');",
@@ -94,6 +100,7 @@ BOARD = Top(
         **axi_top.INSTANCES,
         "registers": "generated/board_register_file.vhd",
         "position": "encoders/position_front.vhd",
+        "master_pins": "encoders/master_encoder.vhd",
         "forcing": "encoders/forced_position.vhd",
         "converters": "converters/current_front.vhd",
         "joining": "io/sample_join.vhd",
@@ -106,6 +113,7 @@ BOARD = Top(
         ("core", "trip"): "core_trip",
         ("core", "clear_trip"): "core_clear",
         ("position", "sample_trigger"): "trigger_next",
+        ("master_pins", "sample_trigger"): "trigger_next",
         ("position", "codes_valid"): "codes_done",
         ("position", "omega_set"): "settings.omega_given",
         ("position", "reverse"): "settings.reverse",
@@ -120,10 +128,13 @@ BOARD = Top(
         "ENCODER": ("integer range 0 to 6", 1, "the kind of encoder, see above"),
         "CURRENTS": ("integer range 0 to 3", 1, "the kind of converter, see above"),
         "SPI_LINES": ("integer range 1 to 4", 4, "data lines of the SPI converters"),
+        "MASTER": ("integer range 0 to 1", 0, "1 builds the pins of a second encoder, the gear's master"),
     },
     _pins(),
     LINES + axi_top.LINES,
-    frozenset({"settings", "omega_now", "speed_now", "position_restart", "forced", "trip_now", "board_stop"})
+    frozenset(
+        {"settings", "omega_now", "speed_now", "position_restart", "forced", "master_code", "trip_now", "board_stop"}
+    )
     | axi_top.LINES_READ,
     {"core_settings": "settings_t", "core_trip": "std_logic", **axi_top.LINES_DRIVE},
 )

@@ -20,6 +20,8 @@ HEADER = """\
 -- The file keeps to VHDL-93 so that a block design can also take it as a module."""
 
 _ABSENT = {  # pins of front ends that a motor does not have
+    "master_a": "std_logic",
+    "master_b": "std_logic",
     "serial_data": "std_logic",
     "busy": "std_logic",
     "eoc": "std_logic",
@@ -59,6 +61,7 @@ HIL = Top(
         "CURRENTS": ("integer range 0 to 0", 0, "codes"),
         "TEMPERATURES": ("integer range 0 to 1", 1, "0 leaves the temperatures out: hot is as cold"),
         "SPI_LINES": ("integer range 1 to 1", 1, "none is used"),
+        "MASTER": ("integer range 0 to 0", 0, "none is here; a host can write gear_code"),
     },
     tuple(pin for pin in axi_top.PINS if pin[0] not in board_top.INSIDE),
     BOARD.lines + _LINES,

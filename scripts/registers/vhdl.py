@@ -25,8 +25,9 @@ GENERICS = {
     "RESIDUAL": 0,
     "MODES": 0,
     "OVERMODULATION": 0,
+    "GEARING": 0,
 }  # as in the core
-BOARD_GENERICS = {"ENCODER": 1, "CURRENTS": 1, "SPI_LINES": 4}
+BOARD_GENERICS = {"ENCODER": 1, "CURRENTS": 1, "SPI_LINES": 4, "MASTER": 0}
 BETWEEN, AT_ONCE = ("setting", "sample pulse"), ("command", "pulse")
 BUS = (
     ("s_axi_awaddr", "in", 12),

@@ -49,6 +49,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "table_current",
         "position_regulator",
         "trajectory",
+        "master_gear",
         "modes",
         "beginnings",
         "ripple_answer",

@@ -10,6 +10,7 @@ set_false_path -to [get_pins -hierarchical -filter {NAME =~ *stage/*/sync_1_reg/
 # Pins of encoders, BUSY and the modulators' own clock: no edge to be in time for.  Each passes two registers with
 # ASYNC_REG and a filter or a detection of edges.
 set_false_path -to [get_pins -hierarchical -filter {NAME =~ *position/*/sync_1_reg/D}]
+set_false_path -to [get_pins -hierarchical -filter {NAME =~ *master_pins/*/sync_1_reg/D}]
 set_false_path -to [get_pins -hierarchical -filter {NAME =~ *converters/*/busy_meta_reg/D}]
 set_false_path -to [get_pins -hierarchical -filter {NAME =~ *converters/*/clock_meta_reg/D}]
 

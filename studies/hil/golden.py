@@ -156,7 +156,7 @@ def run_clocks(hil, asked, moving, host, forced, carry, samples, observed):
             by_code = 1 if forced[SOURCE] == 0 else 0
             given = Given(
                 regs.speed_given * by_code, regs.omega_given, 1 if jumped else regs.position_restart,
-                regs.emf_samples * by_code,
+                regs.emf_samples * by_code, regs.gear_code,
             )  # fmt: skip
             of_samples, o = sample_step(of_samples, sample, regs, config, given)
             for k, value in enumerate(sample):

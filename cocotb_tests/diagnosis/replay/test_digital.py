@@ -50,6 +50,7 @@ SILENT += ("use_table", "k_flux", "u_share", "k_voltage", "share_min", "k_torque
 SILENT += ("table_word",)  # without the torque table
 SILENT += ("voltage_mode", "u_d_ext", "u_q_ext", "u_step", "i_step", "omega_step")  # without the modes
 SILENT += ("k_ripple",)  # without over-modulation
+SILENT += tuple(name for name in fluxproof.REGISTERS if name.startswith("gear_"))  # without gearing
 # Of these registers a recording has what each sample had; one without these signals is replayed with the registers.
 TOLD = {"speed_given": "speed_was_given", "position_restart": "position_restarted"}
 

@@ -45,7 +45,8 @@ static uint32_t generic(uint32_t offset)
 {
     const uint32_t list[] = {FLUXPROOF_ADC_BITS, FLUXPROOF_POSITION_BITS, FLUXPROOF_CARRIER_HALF,
                              FLUXPROOF_CLOCK_HZ, FLUXPROOF_ESTIMATORS, FLUXPROOF_REFERENCES,
-                             FLUXPROOF_POSITION_LOOP, FLUXPROOF_RESIDUAL, FLUXPROOF_MODES};
+                             FLUXPROOF_POSITION_LOOP, FLUXPROOF_RESIDUAL, FLUXPROOF_MODES,
+                             FLUXPROOF_OVERMODULATION, FLUXPROOF_GEARING};
     if (offset == AT(encoder))
         return FLUXPROOF_ENCODER;
     if (offset == AT(currents))

@@ -29,6 +29,7 @@ GENERICS = {
     "residual": 1,
     "modes": 0,
     "overmodulation": 0,
+    "gearing": 0,
 }
 MAP = registers()
 WRITABLE = [r for r in MAP.values() if r.kind.writable]

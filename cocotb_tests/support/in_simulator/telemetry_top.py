@@ -20,6 +20,7 @@ GENERICS = {
     "RESIDUAL": 0,
     "MODES": 0,
     "OVERMODULATION": 0,
+    "GEARING": 0,
     "DEPTH_BITS": 9,
 }
 
@@ -53,7 +54,7 @@ begin
     generic map (ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS, CARRIER_HALF => CARRIER_HALF,
                  ESTIMATORS => ESTIMATORS, REFERENCES => REFERENCES, POSITION_LOOP => POSITION_LOOP,
                  RESIDUAL => RESIDUAL, MODES => MODES,
-                 OVERMODULATION => OVERMODULATION)
+                 OVERMODULATION => OVERMODULATION, GEARING => GEARING)
     port map ({", ".join(f"{name} => {name}" for name in core)});
   stream : entity work.telemetry
     generic map (ADC_BITS => ADC_BITS, POSITION_BITS => POSITION_BITS, DEPTH_BITS => DEPTH_BITS)

@@ -64,6 +64,10 @@ def replay(recording: Recording) -> tuple[Digital, list[str]]:
         return Digital(), [
             "The digital part was not checked: the recording does not hold the targets of position mode."
         ]
+    if _geared(meta):
+        return Digital(), [
+            "The digital part was not checked: the recording does not hold the codes of the gear's master."
+        ]
     if meta["config"].get("modes", 0) and meta["registers"]["voltage_mode"] and not told:
         return Digital(), [
             "The digital part was not checked: the recording does not hold the voltages of voltage mode."
@@ -81,6 +85,16 @@ def replay(recording: Recording) -> tuple[Digital, list[str]]:
     if misfit is not None:
         return _result(run, recording, *misfit), notes
     return _stretches(run, recording, notes)
+
+
+def _geared(meta) -> bool:
+    """Whether the gear acts on codes that a front end gave: only a host that wrote them left them in the changes."""
+    told = [new for _, new in meta.get("changes") or ()]
+    on, by_position = (
+        any(values.get(name, 0) for values in (meta["registers"], *told)) for name in ("gear_on", "position_mode")
+    )
+    written = any("gear_code" in values for values in told)
+    return bool(meta["config"].get("gearing", 0) and on and by_position and not written)
 
 
 def _duties(recording: Recording, config) -> dict:

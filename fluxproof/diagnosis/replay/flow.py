@@ -114,8 +114,7 @@ def trace(state, sample, registers, config, of_speed=None, table=BLANK) -> dict[
     estimators = types.SimpleNamespace(**vars(estimation))
     for name in ("for_control", "step"):
         setattr(estimators, name, _overheard(getattr(estimation, name).py_func, notes))
-    r = registers
-    of_speed = of_speed or fluxproof.Given(r.speed_given, r.omega_given, r.position_restart, r.emf_samples)
+    of_speed = of_speed or fluxproof.given_by_registers.py_func(registers)
     step = _overheard(fluxproof.step_table.py_func, notes, estimation=estimators)
     step(state, sample, registers, config, of_speed, table)
     said = {}

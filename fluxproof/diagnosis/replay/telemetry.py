@@ -47,7 +47,7 @@ BASES = ("current_a", "voltage_v", "omega_me_rad_s", "flux_wb")
 CONFIG = {
     "adc_bits": (12, 16), "position_bits": (8, 18), "carrier_half": CARRIER_HALF_RANGE, "estimators": (0, 1),
     "references": (0, 1), "position_loop": (0, 1), "residual": (0, 1), "modes": (0, 1),
-    "overmodulation": (0, 1),
+    "overmodulation": (0, 1), "gearing": (0, 1),
 }  # fmt: skip
 JUDGED = ("registers", "first_state")  # verified by the replay
 REQUIRED = {
@@ -224,6 +224,7 @@ def _check_names(path, header):
         header["config"].setdefault("residual", 0)
         header["config"].setdefault("modes", 0)
         header["config"].setdefault("overmodulation", 0)
+        header["config"].setdefault("gearing", 0)
         legal = {name: lo <= header["config"][name] <= hi for name, (lo, hi) in CONFIG.items()}
         sane = all(isinstance(x, float) and math.isfinite(x) and x > 0.0 for x in numbers)
     except (KeyError, TypeError) as error:
