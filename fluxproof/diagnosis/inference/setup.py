@@ -49,6 +49,7 @@ class Setup:
         self.visits = visits(self.view, self.points)
         self.grouping = Grouping(self.cells, self.points, self.visits, self.cells.ok & self.train, self.view.run)
         self.repeats = _repeats(self.cells, self.points)
+        self.driven = is_driven(self)
         self.shifts = {}
         self.expected = {
             name for name, effect in self.effects.items() if isinstance(effect, Drift) and effect.expected(self.view)
@@ -66,7 +67,7 @@ class Setup:
 
     def prior(self, points) -> Prior:
         """What the constants say of every set of effects on these points."""
-        always = k.ALWAYS_LOADED if points.loads >= 0 else 1.0
+        always = k.ALWAYS_LOADED if points.loads >= 0 and not self.driven else 1.0
         return Prior(
             float(k.DISCREPANCY), float(k.STEEP), float(self.view.least_error), float(k.STRAIGHT), float(always)
         )
@@ -99,6 +100,19 @@ class Setup:
         y = other.cells.y * scale + self.smooth_rows - other.smooth_rows * scale
         out.cells = dataclasses.replace(self.cells, y=y)
         return out
+
+
+def is_driven(setup) -> bool:
+    """Whether a torque that nobody recorded drives the shaft at an operating point, which no friction does."""
+    cells = setup.cells
+    rows = np.flatnonzero((cells.channel == "torque") & (cells.order == 0) & cells.ok & setup.train)
+    if not (setup.load and len(rows)):
+        return False
+    block = cells.block[rows]
+    along = cells.y[rows] * np.sign(setup.view.omega.mean(axis=1))[block]
+    count = np.bincount(setup.points[block])
+    of_point = [np.bincount(setup.points[block], x) / np.maximum(count, 1) for x in (along, setup.usual[rows])]
+    return bool((of_point[0] > k.DISCREPANCY * of_point[1]).any())
 
 
 def _common_error(setup) -> np.ndarray:
