@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -110,5 +110,5 @@ def _decision(recordings, nominal, progress, shifts) -> Decision:
     whole = decision.verdict in WHOLE  # a part is no reason against a reading that explains all
     readings, rivals, read = preferred(recordings, posterior, whole, progress)
     if not readings:
-        return decision
+        return replace(decision, hinted=tuple(rivals))
     return under(readings, rivals, decision, conclude(read, held), voltage_rms(view))

@@ -10,8 +10,8 @@ import numpy as np
 from fluxproof.diagnosis.decide.credibility import credibilities
 
 
-def two_effects(share_along):
-    """A fit of a sure effect of the size 10 and one of the size 2, beside a leftover of the size 1.
+def two_effects(share_along, small=2.0):
+    """A fit of a sure effect of the size 10 and one of the size ``small``, beside a leftover of the size 1.
 
     share_along: of what the small one explains that lies along the large one's column.
     """
@@ -24,7 +24,7 @@ def two_effects(share_along):
     problem = SimpleNamespace(p=points, keys=[("large", "a"), ("small", "a")], setup=SimpleNamespace(load=0.0))
     return SimpleNamespace(
         problem=problem, names=("large", "small"), lam=np.array([10.0]), mu=np.zeros(1), take=np.arange(2),
-        vector=np.array([10.0, 2.0]), variance=np.ones(100),
+        vector=np.array([10.0, small]), variance=np.ones(100),
     )  # fmt: skip
 
 
@@ -33,3 +33,10 @@ def test_an_error_of_a_sure_effect_imitates_what_is_like_it():
     apart, alike = (credibilities(two_effects(share)) for share in (0.05, 0.99))
     assert apart["large"] > 0.999 and alike["large"] > 0.999
     assert apart["small"] > 0.95 > alike["small"]
+
+
+def test_what_cancels_is_not_explained():
+    """Crosstalk of current sensors was told as a late voltage that an early angle cancels."""
+    alike, opposite = (credibilities(two_effects(0.999, small)) for small in (9.0, -9.0))
+    assert all(p > 0.95 for p in alike.values())
+    assert not any(p > 0.5 for p in opposite.values())

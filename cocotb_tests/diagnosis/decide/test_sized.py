@@ -46,10 +46,10 @@ def found_set(c, explains):
 
 @pytest.mark.parametrize(("first", "second", "alike", "acted_on"), [
     (0.7, 0.7, (1.0, 0.0), True), (0.4, 0.4, (1.0, 0.0), False), (3.0, -3.0, (1.0, 0.2), False),
-    (3.0, 0.1, (0.0, 1.0), True),
+    (3.0, 0.1, (0.0, 1.0), True), (0.7, 0.95, (0.0, 1.0), False),
 ])  # fmt: skip
 def test_causes_of_one_misfit_count_together(first, second, alike, acted_on):
-    """Two halves of a cause that matters are one that matters; two causes that cancel are none."""
+    """Two halves of a cause that matters are one that matters; two that cancel are none, nor two small ones apart."""
     c = {
         "resistance": {"r": first * CATALOGUE["resistance"].relevant(NOMINAL)},
         "magnet_flux": {"psi": second * CATALOGUE["magnet_flux"].relevant(NOMINAL)},

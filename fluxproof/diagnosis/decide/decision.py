@@ -78,7 +78,7 @@ class Decision:
 
     withheld: effects that are not asserted; alike: causes beyond the simulation, other than ``unknown_term``, that the
     residual looks like; readings: interpretations of recording and drive file that are asserted, as conventions/
-    applies them; hinted: those that fit better but leave too much to be asserted; basis: None if nothing was compared.
+    applies them; hinted: those that fit better and are not asserted; basis: None if nothing was compared.
     """
 
     verdict: str

@@ -35,7 +35,8 @@ FORMULA = 0.01
 STRAIGHT = 0.01
 # Largest size of an effect, in units of the smallest of interest, where a ceiling limits it, and where none does.
 WIDEST, UNBOUNDED = 1e3, 300.0
-# Odds against a load that nobody recorded at every operating point: a drive is run without load at one of them.
+# Odds against a load that nobody recorded at every operating point: a brake is off at one of them.  A load that drives
+# the shaft somewhere, as gravity or another machine does, may act everywhere.
 ALWAYS_LOADED = 1e4
 # Distance relative to top speed and rated current below which blocks belong to one operating point, as the drive
 # regulates both.

@@ -72,7 +72,15 @@ def _likelihood(problem, names, take):
     tried = [evidence(rows, columns, prior, np.inf)]
     drags = p.loads >= 0 and bool(columns.x[:, p.group == p.loads].any())
     if drags and tried[0].strained:  # which rows are loaded depends on which are taken so at first
-        tried += [evidence(rows, columns, prior, start) for start in LOADED_FROM]
+        tried += [evidence(rows, columns, prior, start) for start in _starts(p)]
     best = max(tried, key=lambda found: found.log_evidence)
     own = slice(len(take))
     return take, best.log_evidence, best.c[own], best.covariance[own, own], best.sizes[:-1], best.lam, best.mu
+
+
+def _starts(p) -> list[float]:
+    """The values of LOADED_FROM that take different rows as loaded; what the same rows begin ends alike."""
+    torque = np.abs(p.y[p.group == p.loads])
+    lightest = np.min(torque + p.level[p.group == p.loads])
+    taken = {tuple(torque > start * lightest): start for start in reversed(LOADED_FROM)}
+    return sorted(taken.values())

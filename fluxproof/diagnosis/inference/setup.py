@@ -49,6 +49,7 @@ class Setup:
         self.visits = visits(self.view, self.points)
         self.grouping = Grouping(self.cells, self.points, self.visits, self.cells.ok & self.train, self.view.run)
         self.repeats = _repeats(self.cells, self.points)
+        self.driven = is_driven(self)
         self.shifts = {}
         self.expected = {
             name for name, effect in self.effects.items() if isinstance(effect, Drift) and effect.expected(self.view)
@@ -66,7 +67,7 @@ class Setup:
 
     def prior(self, points) -> Prior:
         """What the constants say of every set of effects on these points."""
-        always = k.ALWAYS_LOADED if points.loads >= 0 else 1.0
+        always = k.ALWAYS_LOADED if points.loads >= 0 and not self.driven else 1.0
         return Prior(
             float(k.DISCREPANCY), float(k.STEEP), float(self.view.least_error), float(k.STRAIGHT), float(always)
         )
@@ -101,6 +102,19 @@ class Setup:
         return out
 
 
+def is_driven(setup) -> bool:
+    """Whether a torque that nobody recorded drives the shaft at an operating point, which no friction does."""
+    cells = setup.cells
+    rows = np.flatnonzero((cells.channel == "torque") & (cells.order == 0) & cells.ok & setup.train)
+    if not (setup.load and len(rows)):
+        return False
+    block = cells.block[rows]
+    along = cells.y[rows] * np.sign(setup.view.omega.mean(axis=1))[block]
+    count = np.bincount(setup.points[block])
+    of_point = [np.bincount(setup.points[block], x) / np.maximum(count, 1) for x in (along, setup.usual[rows])]
+    return bool((of_point[0] > k.DISCREPANCY * of_point[1]).any())
+
+
 def _common_error(setup) -> np.ndarray:
     """(r, n) errors of the balance that all operating points have in common, each of the size of its prior."""
     return np.array([setup.projector.rows({"u": p}) for p in setup.view.common_errors()]).T
@@ -122,11 +136,16 @@ def _repeats(cells, points):
 
 
 def repeated(ripple, setup):
-    """(r,) the part of ripple rows that repeats in all blocks of an operating point, shrunk by what noise may be."""
+    """(r,) the part of ripple rows that is no noise.
+
+    It repeats in all blocks of an operating point, and is shrunk by what noise may be; where a current still settles,
+    it is the whole ripple.
+    """
     cells, cell = setup.cells, setup.repeats
-    w = np.where(cells.ok, 1.0, 0.0)
+    settles = setup.rows.settles[cells.block]
+    w = np.where(cells.ok & ~settles, 1.0, 0.0)
     count = np.maximum(np.bincount(cell, w), 1.0)
     mean = np.bincount(cell, w * ripple) / count
     spread = np.bincount(cell, w * (ripple - mean[cell]) ** 2) / np.maximum(count - 1.0, 1.0) / count
     kept = np.maximum(1.0 - k.RIPPLE * spread / np.maximum(mean**2, 1e-300), 0.0) * (count > 2)
-    return (kept * mean)[cell]
+    return np.where(settles, ripple, (kept * mean)[cell])

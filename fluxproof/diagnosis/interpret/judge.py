@@ -52,9 +52,9 @@ class Judged:
 def preferred(recordings, posterior, explained, progress=lambda text: None):
     """(readings, rivals, Posterior) that the data prefer; without readings if what is documented fits best.
 
-    An interpretation that is not met exactly, or replaces no effect (mistake.py), is rejected.  rivals:
-    readings that leave the same balance; posterior: of the effects as documented; explained: whether these explain the
-    misfit.
+    An interpretation that is not met exactly, or replaces no effect (mistake.py), is rejected: the best of those that
+    would fit better are rivals of what is documented.  rivals: readings that leave the same balance; posterior: of the
+    effects as documented; explained: whether these explain the misfit.
     """
     setup, known = posterior.setup, posterior.best().value
     if len(np.unique(setup.points)) < k.READ_POINTS:
@@ -75,7 +75,7 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
     singles = {j.readings[0].code: j.value for j in good}
     two = [j for j in two if j.value > max(singles.get(r.code, plain.value) for r in j.readings)]
     ranked = _without_doubles(sorted([*good, *two], key=_rank))
-    best, found = None, posterior
+    best, found, rejected, most_probable = None, posterior, [], known
     for j in ranked[:SEARCHED]:
         prior = len(j.readings) * np.log(k.MISREAD)
         if max(j.value, perfect - k.ONE_EFFECT + prior) <= known:
@@ -96,10 +96,12 @@ def preferred(recordings, posterior, explained, progress=lambda text: None):
         met = met and (value > free or _is_clean(other.best()))
         if value > known and met:
             best, known, found = j, value, other
+        elif value > most_probable and len(j.readings) == 1:
+            rejected, most_probable = [*j.readings, *_rivals(j, good)], value
         if best is j and not other.best().names:
             break  # nothing is left that another reading could explain
     if best is None:
-        return (), [], posterior
+        return (), rejected, posterior
     return best.readings, _rivals(best, good), found
 
 

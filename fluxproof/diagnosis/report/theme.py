@@ -17,6 +17,7 @@ import matplotlib as mpl
 import numpy as np
 from markupsafe import Markup, escape
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from fluxproof.quote import mathtext, visible
@@ -89,9 +90,19 @@ def plain(text: str) -> str:
     return mathtext(line if len(line) <= 40 else f"{line[:39]}…")
 
 
+def _place(figure: Figure) -> None:
+    """Place the axes once and for all: a figure whose layout is still open is drawn twice as it is saved."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        FigureCanvasSVG(figure)  # whose renderer measures the words
+        engine.execute(figure)
+        figure.set_layout_engine("none")
+
+
 def picture(name: str, figure: Figure, caption: str) -> Picture:
     """The figure as an inline SVG element whose colours follow the page; ``name`` makes its ids unique."""
     with mpl.rc_context(STYLE), io.BytesIO() as stream:
+        _place(figure)
         figure.savefig(stream, format="svg", dpi=144, metadata=NO_METADATA)
         svg = stream.getvalue().decode()
     svg = svg[svg.index("<svg") :]

@@ -13,6 +13,7 @@ from fluxproof.diagnosis.decide.decision import (
     Decision,
     Withheld,
 )
+from fluxproof.diagnosis.decide.verdict import WHOLE
 from fluxproof.diagnosis.effects.drive_file import caveat
 from fluxproof.diagnosis.words.balance_notes import balance_notes
 from fluxproof.diagnosis.words.best_fit import minor_notes
@@ -33,7 +34,7 @@ def notes_of(decision: Decision, effects) -> list[str]:
         *withheld(CONSTANT, SIZELESS),
         *withheld(NOISE, INSIGNIFICANT),
         *minor_notes(decision.minor, effects),
-        *_hint(decision.hinted),
+        *_hint(decision),
     ]
 
 
@@ -60,9 +61,13 @@ def _of_balance(decision: Decision, basis: Basis) -> list[str]:
     return [*balance_notes(basis.view, basis.held, effects, decision.ambiguity), *filter(None, caveats)]
 
 
-def _hint(readings) -> list[str]:
-    """An interpretation that would fit better but leaves a large residual."""
-    if not readings:
+def _hint(decision: Decision) -> list[str]:
+    """An interpretation that would fit better and is not asserted."""
+    if not decision.hinted:
         return []
-    says = "; ".join(r.says for r in readings)
+    says = "; or ".join(r.says for r in decision.hinted)
+    if decision.verdict in WHOLE:
+        return [
+            f"Or {says}: with fewer causes beside it, that explains the misfit too, and this recording cannot tell."
+        ]
     return [f"The interpretation that {says} would fit better, but a large residual remains, so this is only a hint."]
