@@ -121,6 +121,7 @@ _SETTINGS = """
     1d8 v_comp_max    1dc i_learn        1e0 eta_psi      1e4 omega_psi_min  1e8 k_ahead      1ec k_sign
     1f0 i_trip        1f4 sum_trip       1f8 u_dc_min     1fc u_dc_max
     200 omega_trip    204 omega_away     208 runaway_samples               20c omega_stall  210 stall_samples
+    384 way_stall
     214 i_open        218 offset_max     21c heartbeat    220 brake_on     224 brake_off
     228 emf_min       22c emf_i          230 emf_w        234 emf_samples    238 emf_l
     240 double_update
@@ -136,7 +137,7 @@ _SETTINGS = """
     350 residual_sum_max                 354 residual_sum_i
     378 residual_leg  37c residual_light
     380 residual_slow
-"""  # 24c, 278 to 27c, 2d8 to 2dc, 2e8 to 33c, 384 to 3bc and 3f0 to 3fc are free
+"""  # 24c, 278 to 27c, 2d8 to 2dc, 2e8 to 33c, 388 to 3bc and 3f0 to 3fc are free
 _COMMANDS = {
     "enable": (0x040, Kind.COMMAND),
     "clear_trip": (0x044, Kind.PULSE),

@@ -925,6 +925,10 @@ begin
         settings.residual_slow <= signed(held(17 downto 0));
         written(224)           <= '1';
       end if;
+      if (row(28) and column(1) and not sample_busy) = '1' then
+        settings.way_stall <= unsigned(held(19 downto 0));
+        written(225)       <= '1';
+      end if;
       if (row(30) and column(0)) = '1' then
         ring_arm <= held(0);
       end if;
@@ -1536,6 +1540,7 @@ begin
         settings.residual_leg     <= (others => '0');
         settings.residual_light   <= (others => '0');
         settings.residual_slow    <= (others => '0');
+        settings.way_stall        <= to_unsigned(1, 20);
         ring_arm                  <= '0';
         ring_stop                 <= '0';
         ring_faults               <= (others => '0');
@@ -1860,7 +1865,9 @@ begin
   shown(219)         <= "" & std_logic_vector(resize(estimated.residual_sixth_q, 32));
   shown(220)         <= std_logic_vector(resize(estimated.residual_power, 32));
   shown(221)         <= std_logic_vector(resize(estimated.residual_sum, 32));
-  shown(222 to 239)  <= (others => (others => '0'));
+  shown(222 to 224)  <= (others => (others => '0'));
+  shown(225)         <= x"00000001";
+  shown(226 to 239)  <= (others => (others => '0'));
   shown(240)         <= "0000000000000000000000000000000" & ring_arm;
   shown(241)         <= "0000000000000000000000000000000" & ring_stop;
   shown(242 to 247)  <= (others => (others => '0'));
