@@ -360,6 +360,22 @@ def test_the_window_of_a_zynq(tmp_path):
             bus.write(name, value)
 
 
+def test_a_setting_that_needs_the_gates_off_is_not_sent_while_they_switch(tmp_path):
+    """Said by name: the core would refuse it, and the bus end the process."""
+    bus = UioBus(window(tmp_path, flags=1, k_delay=7))
+    with pytest.raises(BusError, match="k_delay is taken while the gates are off"):
+        bus.write("k_delay", 8)
+    assert bus.read("k_delay") == 7
+    bus = UioBus(window(tmp_path))
+    bus.write("k_delay", 8)
+    assert bus.read("k_delay") == 8
+    simulated = motor_bus(load(DRIVES / "servo_24v.toml"))
+    simulated.write("position_source", 1)
+    simulated.write("enable", 1)
+    with pytest.raises(BusError, match="position_source"):
+        simulated.write("position_source", 0)
+
+
 def test_values_of_two_samples_are_no_snapshot(tmp_path):
     bus = UioBus(window(tmp_path, position_bits=16, snap_position=5, theta_me=1))
     with pytest.raises(BusError, match="within one sample"):

@@ -172,7 +172,8 @@ def words(golden: BoardClock, shown: dict[str, int]) -> dict[str, int]:
     return {
         name: file.read(register.address)[1]
         for name, register in file.map.items()
-        if register.kind in (Kind.SETTING, Kind.COMMAND) or all(field.name in known for field in register.fields)
+        if register.kind in (Kind.SETTING, Kind.STILL, Kind.COMMAND)
+        or all(field.name in known for field in register.fields)
     }
 
 

@@ -68,6 +68,8 @@ class RegisterFile:
         value = from_word(word)
         if not register.port.low <= value <= register.port.high:
             return SLVERR
+        if register.kind is Kind.STILL and self.status["running"]:
+            return SLVERR
         if not register.needs or self._constant[register.needs]:
             self.values[register.name] = value
         return OKAY

@@ -348,6 +348,7 @@ begin
       data        => data,
       strobe      => strobe,
       sample_busy => sample_busy,
+      running     => running,
       arming      => arming,
       store       => store,
       answer      => answer,
@@ -965,7 +966,7 @@ begin
       if (row(32) and column(5)) = '1' then
         take_snapshot <= held(0);
       end if;
-      if (row(32) and column(6)) = '1' then
+      if (row(32) and column(6) and not sample_busy) = '1' then
         position_source <= held(0);
         written(262)    <= '1';
       end if;

@@ -202,6 +202,7 @@ begin
       data        => data,
       strobe      => strobe,
       sample_busy => sample_busy,
+      running     => running,
       arming      => arming,
       store       => store,
       answer      => answer,

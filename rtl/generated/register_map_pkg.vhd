@@ -18,11 +18,12 @@ package register_map_pkg is
   constant REGISTER_LIMIT_W   : positive := 32;
   constant REGISTER_RANGE_W   : positive := 6;
 
-  -- Between: takes effect between two samples
-  constant REGISTER_NONE      : unsigned(1 downto 0) := "00";
-  constant REGISTER_READ_ONLY : unsigned(1 downto 0) := "01";
-  constant REGISTER_BETWEEN   : unsigned(1 downto 0) := "10";
-  constant REGISTER_AT_ONCE   : unsigned(1 downto 0) := "11";
+  -- Between: takes effect between two samples; still: likewise, while the gates are off alone
+  constant REGISTER_NONE      : unsigned(2 downto 0) := "000";
+  constant REGISTER_READ_ONLY : unsigned(2 downto 0) := "001";
+  constant REGISTER_BETWEEN   : unsigned(2 downto 0) := "010";
+  constant REGISTER_AT_ONCE   : unsigned(2 downto 0) := "011";
+  constant REGISTER_STILL     : unsigned(2 downto 0) := "110";
 
   function register_access_of (word : unsigned(REGISTER_WORD_W - 1 downto 0)) return unsigned;
   function register_range_of (word : unsigned(REGISTER_WORD_W - 1 downto 0)) return unsigned;
@@ -35,7 +36,7 @@ end package register_map_pkg;
 package body register_map_pkg is
 
   -- Tables instead of conditions: a multiplexer is faster than as many comparisons
-  type access_t is array (0 to 2**REGISTER_WORD_W - 1) of unsigned(1 downto 0);
+  type access_t is array (0 to 2**REGISTER_WORD_W - 1) of unsigned(2 downto 0);
   type range_t is array (0 to 2**REGISTER_WORD_W - 1) of unsigned(REGISTER_RANGE_W - 1 downto 0);
   type signed_t is array (0 to 2**REGISTER_WORD_W - 1) of std_logic;
   type low_t is array (0 to 2**REGISTER_RANGE_W - 1) of signed(REGISTER_LIMIT_W - 1 downto 0);
@@ -45,8 +46,9 @@ package body register_map_pkg is
   (
     0 to 11 | 32 to 48 | 50 to 59 | 184 to 185 | 214 to 221 | 248 to 251 | 256 to 258 | 272 to 282 | 284 to 292 | 576 to 587                                                                                                                          => REGISTER_READ_ONLY,
     12 to 15 | 31 | 49 | 60 to 63 | 107 | 147 | 158 to 159 | 182 to 183 | 186 to 207 | 226 to 239 | 252 to 255 | 259 | 266 to 271 | 283 | 293 to 319 | 375 to 511 | 518 to 519 | 531 | 535 | 540 to 543 | 558 to 559 | 565 to 567 | 575 | 588 to 1023 => REGISTER_NONE,
-    16 to 17 | 19 | 26 to 27 | 240 to 247 | 260 to 265 | 512 to 517 | 520 to 530 | 532 to 534 | 536 to 539 | 544 to 557 | 560 to 564 | 568 to 574                                                                                                     => REGISTER_AT_ONCE,
-    18 | 20 to 25 | 28 to 30 | 64 to 106 | 108 to 146 | 148 to 157 | 160 to 181 | 208 to 213 | 222 to 225 | 320 to 374                                                                                                                                => REGISTER_BETWEEN
+    16 to 17 | 19 | 26 to 27 | 240 to 247 | 260 to 261 | 263 to 265 | 512 to 517 | 520 to 530 | 532 to 534 | 536 to 539 | 544 to 557 | 560 to 564 | 568 to 574                                                                                        => REGISTER_AT_ONCE,
+    18 | 20 to 25 | 28 to 30 | 64 to 66 | 70 | 75 | 77 to 82 | 84 to 90 | 94 to 106 | 108 to 146 | 148 to 157 | 160 to 181 | 208 to 213 | 222 to 225 | 320 to 321 | 324 to 326 | 328 to 331 | 333 | 335 to 353 | 359 to 374                           => REGISTER_BETWEEN,
+    67 to 69 | 71 to 74 | 76 | 83 | 91 to 93 | 262 | 322 to 323 | 327 | 332 | 334 | 354 to 358                                                                                                                                                        => REGISTER_STILL
   );
 
   constant RANGE_OF : range_t :=

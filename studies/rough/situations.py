@@ -250,6 +250,24 @@ def silent_host(drive: Drive, part: float) -> tuple[str, bool]:
     return seen, good and not early
 
 
+def written_at_speed(drive: Drive, part: float) -> tuple[str, bool]:
+    """Still settings far from theirs while the drive runs: refused, and it runs on; with the gates off one is taken."""
+    board = running(drive, part)
+    values = board.golden.registers.values
+    wrong = {"reverse": 1 - values["reverse"], "k_u_max": values["k_u_max"] // 2, "k_delay": 0, "gain_a": 0}
+    wrong |= {"pole_pairs": values["pole_pairs"] % 63 + 1, "dead_time": 1, "min_pulse": 2, "position_source": 1}
+    for name, value in wrong.items():
+        board.run(1, **{name: value})
+    board.run_s(0.01)
+    refused, ran = board.golden.refused[:], not board.faults and bool(board.golden.state.wires.running)
+    board.run(2, enable=0)
+    board.run(2, k_delay=0)
+    taken = values["k_delay"] == 0 and board.golden.refused == refused
+    return f"{len(refused)} of {len(wrong)} refused, {', '.join(board.faults) or 'no fault'}", (
+        refused == list(wrong) and ran and taken
+    )
+
+
 def scripted(make: Callable[[], FaultRun], names: frozenset[str]):
     """The script of fluxproof/cosim/fault_run.py, without a motor: all of these faults trip in their turn."""
 
@@ -305,6 +323,7 @@ TABLE = (
         (0.0,),
         scripted(edges_run, frozenset(("index_wrong", "host_lost", "trip"))),
     ),
+    Situation("settings written that need the gates off", "refused, runs on", ALL, (0.6,), written_at_speed),
     Situation("the host is silent", "host_lost in the heartbeat's time", ALL, (0.3,), silent_host),
 )
 PASSES = {"enabled before the index": 2, "index dead, two turns by hand": 2, "Z stuck at 1, two turns by hand": 2,
