@@ -1007,13 +1007,13 @@ extern "C" {
 #define FLUXPROOF__U_STEP__VALUE_bm 0xffffffff
 #define FLUXPROOF__U_STEP__VALUE_bp 0
 #define FLUXPROOF__U_STEP__VALUE_bw 32
-#define FLUXPROOF__U_STEP__VALUE_reset 0x0
+#define FLUXPROOF__U_STEP__VALUE_reset 0x1
 
 // reg - fluxproof::i_step
 #define FLUXPROOF__I_STEP__VALUE_bm 0xffffffff
 #define FLUXPROOF__I_STEP__VALUE_bp 0
 #define FLUXPROOF__I_STEP__VALUE_bw 32
-#define FLUXPROOF__I_STEP__VALUE_reset 0x0
+#define FLUXPROOF__I_STEP__VALUE_reset 0x1
 
 // reg - fluxproof::omega_step
 #define FLUXPROOF__OMEGA_STEP__VALUE_bm 0xffffffff

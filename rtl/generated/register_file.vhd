@@ -938,8 +938,8 @@ begin
         settings.voltage_mode     <= '0';
         settings.u_d_ext          <= (others => '0');
         settings.u_q_ext          <= (others => '0');
-        settings.u_step           <= (others => '0');
-        settings.i_step           <= (others => '0');
+        settings.u_step           <= to_signed(1, 18);
+        settings.i_step           <= to_signed(1, 18);
         settings.omega_step       <= to_signed(1, 18);
         settings.k_ripple         <= (others => '0');
         settings.residual_min     <= (others => '0');
@@ -1151,7 +1151,9 @@ begin
   shown(74 to 98)   <= (others => (others => '0'));
   shown(99)         <= x"00000100";
   shown(100)        <= x"00001000";
-  shown(101 to 179) <= (others => (others => '0'));
+  shown(101 to 177) <= (others => (others => '0'));
+  shown(178)        <= x"00000001";
+  shown(179)        <= x"00000001";
   shown(180)        <= x"00000001";
   shown(181 to 183) <= (others => (others => '0'));
   shown(184)        <= "" & std_logic_vector(resize(observed.shaft_position, 32));
