@@ -694,7 +694,7 @@ def step_table(state, sample, regs, config, of_speed, table):
     )
     motion_checks_state, (motion_faults,) = motion_checks.step(
         state.of_motion_checks, omega_me, omega_asked, regulates, speed_limited, regen_limited, x.run, r.omega_trip,
-        r.omega_away, r.runaway_samples, r.omega_stall, r.stall_samples,
+        r.omega_away, r.runaway_samples, r.way_stall, r.stall_samples,
     )  # fmt: skip
     emf_check_state, (encoder_lost,) = emf_check.step(
         state.of_emf_check,

@@ -3,6 +3,7 @@
 
 import math
 
+from golden_model.formats import PU
 from golden_model.scale_entry import Entry, base_keys
 
 
@@ -15,6 +16,8 @@ def modes(drive):
     yield Entry("u_q_ext", 0.0, "V", b.voltage_v, "none: the voltage of voltage mode")
     circle = drive.inverter.dc_bus_v / math.sqrt(3.0)
     keys = "[control] mode_change_s; [inverter] dc_bus_v, pwm_frequency_hz"
-    yield Entry("u_step", circle * min(t_s / c.mode_change_s, 1.0), "V", b.voltage_v, f"{keys}; {volts}")
-    step = drive.current_limit_a * min(t_s / c.mode_change_s, 1.0)
+    # A step below one LSB would never end
+    step = max(circle * min(t_s / c.mode_change_s, 1.0), PU.lsb * b.voltage_v)
+    yield Entry("u_step", step, "V", b.voltage_v, f"{keys}; {volts}")
+    step = max(drive.current_limit_a * min(t_s / c.mode_change_s, 1.0), PU.lsb * b.current_a)
     yield Entry("i_step", step, "A", b.current_a, f"[control] mode_change_s, current_limit_a; {amperes}")

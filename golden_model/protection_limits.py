@@ -18,6 +18,7 @@ from golden_model.io.emf_check import EMF_I, EMF_L, EMF_MIN, EMF_W, MEAN
 from golden_model.io.emf_check import SAMPLES as EMF_SAMPLES
 from golden_model.io.fault_latch import NAMES
 from golden_model.io.motion_checks import AWAY as AWAY_COUNT
+from golden_model.io.motion_checks import WAY_LIMIT
 from golden_model.io.offset_check import OFFSET
 from golden_model.scale_entry import Entry, base_keys, leg_loss_v
 from golden_model.units import TURN_RAD
@@ -159,6 +160,9 @@ def motion_limits(drive):
             away = min(away + SECTOR / late, AWAY_COUNT.hi * t_s)
     yield Entry("runaway_samples", away, "s", t_s, f"[protection] runaway_s; {sample}")
     yield Entry("stall_samples", p.stall_s, "s", t_s, f"[protection] stall_s; {sample}")
+    stands = STANDS * rated if p.standstill_rad_s is None else p.standstill_rad_s
+    key = "[protection] standstill_rad_s, stall_s; [machine] rated_speed_rad_s"
+    yield _fitting("way_stall", pairs * stands * p.stall_s / 2.0, "rad", b.omega_me_rad_s * t_s, WAY_LIMIT, key)
     keys = WORKING
     least = OPEN_OF_RATED * drive.working_current_a
     yield _limit("i_open", p.open_load_a, least, "A", b.current_a, "open_load_a", keys, amperes)

@@ -67,6 +67,7 @@ _ONE_OF_REGISTER = {
     "omega_0": "1/T_s",
     "position_kp": "omega_base/(2*pi*pole_pairs)",
     "move_speed": "2*pi/T_s",
+    "way_stall": "omega_base*T_s",
     **dict.fromkeys(("dead_time", "min_pulse", "watchdog"), "1/clock_hz"),
     **dict.fromkeys(
         ("runaway_samples", "stall_samples", "emf_samples", "residual_samples", "heartbeat", "charge_samples"), "T_s"

@@ -346,6 +346,19 @@ def window(tmp_path, **values):
     return path
 
 
+def test_a_dead_time_at_a_small_inductance_is_no_saturation():
+    """As found on drone_24v with 25 uH and 0.1 ohm, which is linear; ten times the inductance bends as it says."""
+    session, amplitudes = SimpleNamespace(t_s=25e-6, limit=7.0), [2.1, 3.5, 4.9]
+
+    def said(scale):
+        l_d, l_q = ([scale * x * 1e-6 for x in values] for values in ((19.4, 24.5, 24.9), (18.3, 24.1, 25.0)))
+        sigmas = [scale * x * 1e-6 for x in (1.5, 0.56, 0.3)]
+        each = SimpleNamespace(v_dead=0.182, l_d=l_d, l_q=l_q, s_l_d=sigmas, s_l_q=sigmas)
+        return winding._over_current(session, amplitudes, each, 2 * np.pi * 240.0)
+
+    assert said(1.0) == "" and "needs a map" in said(10.0)
+
+
 def test_the_window_of_a_zynq(tmp_path):
     bits = {"position_bits": 16, "snap_position": 5, "theta_me": 3 * 5 << 2}
     path = window(tmp_path, i_d=-7, u_q=9, **bits)
@@ -358,6 +371,22 @@ def test_the_window_of_a_zynq(tmp_path):
     for name, value in (("i_d_ref", 1 << 20), ("theta_me", 0), ("nothing", 0)):
         with pytest.raises(BusError):
             bus.write(name, value)
+
+
+def test_a_setting_that_needs_the_gates_off_is_not_sent_while_they_switch(tmp_path):
+    """Said by name: the core would refuse it, and the bus end the process."""
+    bus = UioBus(window(tmp_path, flags=1, k_delay=7))
+    with pytest.raises(BusError, match="k_delay is taken while the gates are off"):
+        bus.write("k_delay", 8)
+    assert bus.read("k_delay") == 7
+    bus = UioBus(window(tmp_path))
+    bus.write("k_delay", 8)
+    assert bus.read("k_delay") == 8
+    simulated = motor_bus(load(DRIVES / "servo_24v.toml"))
+    simulated.write("position_source", 1)
+    simulated.write("enable", 1)
+    with pytest.raises(BusError, match="position_source"):
+        simulated.write("position_source", 0)
 
 
 def test_values_of_two_samples_are_no_snapshot(tmp_path):

@@ -21,6 +21,8 @@ from fluxproof.cosim.golden_loop import simulate
 from fluxproof.cosim.scenarios import RPM, scenario
 from golden_model import drive as drives
 from golden_model.control import current_limit
+from golden_model.formats import LIMIT
+from golden_model.io import motion_checks
 from golden_model.io.fault_latch import NAMES
 from golden_model.io.sample_checks import IGNORE
 from golden_model.protection_limits import regen_end_v
@@ -125,11 +127,34 @@ def test_a_stall_trips_unless_it_is_ignored():
     assert first(result) == ["stall"] and not result.running[-1]
 
 
+def stall_after(speeds, way_stall=500, stall_samples=100):
+    """Samples until a shaft with these speeds [LSB] at the current limit is a stall; 0: it is none."""
+    state = motion_checks.State()
+    for k, omega in enumerate(speeds):
+        state, (faults,) = motion_checks.step(
+            state, int(omega), 5000, 1, 1, 0, 1, LIMIT.hi, LIMIT.hi, motion_checks.AWAY_HI, way_stall, stall_samples
+        )
+        if faults & 4:
+            return k + 1
+    return 0
+
+
+def test_a_tremble_is_a_stall_a_start_and_a_reversal_are_none():
+    """500 LSB/256 times samples in 100 samples: what counts is where the shaft gets to, not how fast it trembles."""
+    k = np.arange(1000)
+    amplitude = 0.9 * (500 << 8) * 2 * np.pi / 40  # of the speed, 40 samples a cycle: nearly the way of both sides
+    assert 100 <= stall_after(amplitude * np.sin(2 * np.pi * k / 40)) < 140
+    assert stall_after(0 * k) == 100
+    least = 2 * (500 << 8) / 100**2  # LSB a sample: to the end of the way in this time from rest
+    assert stall_after(1.05 * least * k) == 0 and stall_after(0.8 * least * k[:300]) == 100
+    assert stall_after(2.1 * least * (k - 500.0)) == 0
+
+
 def play_blocked(periods, rpm, load, changes):
     """The shaft held by a load that follows the torque: the machine's own torque at the limit."""
     torque = 1.5 * DRIVE.machine.pole_pairs * DRIVE.machine.magnet_flux_wb * DRIVE.current_limit_a
     ramp = np.minimum(1.0, np.arange(periods) / 10.0)
-    return play(periods, rpm, load=torque * 1.0 * ramp, changes=changes | {"omega_stall": 60, "omega_away": 511})
+    return play(periods, rpm, load=torque * 1.0 * ramp, changes=changes | {"way_stall": 1 << 12, "omega_away": 511})
 
 
 def open_core(carrying, **changes):

@@ -8,6 +8,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from golden_model.fluxproof import REGISTERS
 from golden_model.registers import registers
 from golden_model.units import to_si
 from studies.position import figures, modes
@@ -46,6 +47,13 @@ def test_a_current_beyond_its_limit_does_not_spoil_the_flux():
 def test_without_the_block_a_change_makes_a_step():
     """The scene would show it: torque to speed mode with a speed error of a tenth."""
     assert step_of(modes.with_modes(DRIVE, False), "torque", "speed") > 0.1
+
+
+def test_the_slowest_change_of_modes_ends():
+    """A step of zero would leave the reference of the mode before for good: neither drive file nor bus can set one."""
+    slow = dataclasses.replace(DRIVE, control=dataclasses.replace(DRIVE.control, mode_change_s=1e6))
+    for name in ("u_step", "i_step", "omega_step"):
+        assert getattr(registers(slow).values, name) == REGISTERS[name].low == 1
 
 
 def test_within_a_mode_every_bit_is_as_without_the_block():

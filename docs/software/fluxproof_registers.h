@@ -1018,13 +1018,13 @@ extern "C" {
 #define FLUXPROOF__U_STEP__VALUE_bm 0xffffffff
 #define FLUXPROOF__U_STEP__VALUE_bp 0
 #define FLUXPROOF__U_STEP__VALUE_bw 32
-#define FLUXPROOF__U_STEP__VALUE_reset 0x0
+#define FLUXPROOF__U_STEP__VALUE_reset 0x1
 
 // reg - fluxproof::i_step
 #define FLUXPROOF__I_STEP__VALUE_bm 0xffffffff
 #define FLUXPROOF__I_STEP__VALUE_bp 0
 #define FLUXPROOF__I_STEP__VALUE_bw 32
-#define FLUXPROOF__I_STEP__VALUE_reset 0x0
+#define FLUXPROOF__I_STEP__VALUE_reset 0x1
 
 // reg - fluxproof::omega_step
 #define FLUXPROOF__OMEGA_STEP__VALUE_bm 0xffffffff
@@ -1188,6 +1188,12 @@ extern "C" {
 #define FLUXPROOF__RESIDUAL_SLOW__VALUE_bp 0
 #define FLUXPROOF__RESIDUAL_SLOW__VALUE_bw 32
 #define FLUXPROOF__RESIDUAL_SLOW__VALUE_reset 0x0
+
+// reg - fluxproof::way_stall
+#define FLUXPROOF__WAY_STALL__VALUE_bm 0xfffff
+#define FLUXPROOF__WAY_STALL__VALUE_bp 0
+#define FLUXPROOF__WAY_STALL__VALUE_bw 20
+#define FLUXPROOF__WAY_STALL__VALUE_reset 0x1
 
 // reg - fluxproof::ring_arm
 #define FLUXPROOF__RING_ARM__VALUE_bm 0x1
@@ -2342,7 +2348,8 @@ typedef struct {
     uint32_t residual_leg;
     uint32_t residual_light;
     uint32_t residual_slow;
-    uint8_t RESERVED_384_3bf[0x3c];
+    uint32_t way_stall;
+    uint8_t RESERVED_388_3bf[0x38];
     uint32_t ring_arm;
     uint32_t ring_stop;
     uint32_t ring_faults;

@@ -11,6 +11,7 @@ from __future__ import annotations
 import mmap
 import os
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
@@ -18,11 +19,12 @@ import numpy as np
 
 from golden_model.drive_keys import DriveError
 from golden_model.io import board_map, position
-from golden_model.io.register_map import IDENTIFICATION
+from golden_model.io.register_map import IDENTIFICATION, Kind
 
 CODES = ("snap_code", "snap_position", "snap_adc_a", "snap_adc_b", "snap_adc_c", "snap_adc_u_dc")
 VALUES = ("i_d", "i_q", "omega_me", "u_dc", "u_d", "u_q")  # the voltages last: they are computed last
 WINDOW = 4096  # bytes
+RUNNING = 1 << 0  # of the register flags
 ATTEMPTS, POLLS = 200, 10000
 
 
@@ -38,7 +40,7 @@ class Bus(Protocol):
         ...
 
     def write(self, name: str, value: int) -> None:
-        """Set a register; BusError where its range does not hold the value."""
+        """Set a register; BusError where its range does not hold the value, or where the gates have to be off."""
         ...
 
     def snapshot(self) -> dict[str, int]:
@@ -54,13 +56,17 @@ class Bus(Protocol):
         ...
 
 
-def checked(registers, name: str, value: int) -> int:
-    """The address of a register that takes the value; BusError for any other."""
+def checked(registers, name: str, value: int, running: Callable[[], bool]) -> int:
+    """The address of a register that takes the value; BusError for any other, and for a still setting while the gates
+    switch: the core would refuse it, which ends a process through userspace I/O.
+    """
     register = registers.get(name)
     if register is None or not register.kind.writable:
         raise BusError(f"{name} is not a register that can be written")
     if not register.port.low <= value <= register.port.high:
         raise BusError(f"{name} = {value} is out of range: {register.port.low} to {register.port.high}")
+    if register.kind is Kind.STILL and running():
+        raise BusError(f"{name} is taken while the gates are off alone: enable = 0 before")
     return register.address
 
 
@@ -91,7 +97,8 @@ class UioBus:
         return int(words[register.address // 4])
 
     def write(self, name: str, value: int) -> None:
-        self._words[checked(self.registers, name, value) // 4] = value & 0xFFFFFFFF
+        address = checked(self.registers, name, value, lambda: bool(self.read("flags") & RUNNING))
+        self._words[address // 4] = value & 0xFFFFFFFF
 
     def snapshot(self) -> dict[str, int]:
         for _ in range(ATTEMPTS):

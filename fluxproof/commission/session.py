@@ -17,10 +17,13 @@ from golden_model.drive import Drive
 from golden_model.drive_keys import DriveError
 from golden_model.encoders import forced_position
 from golden_model.fluxproof import REGISTERS
+from golden_model.io import board_map
 from golden_model.io.fault_latch import NAMES
+from golden_model.io.register_map import Kind
 from golden_model.registers import registers
 from golden_model.units import TURN_RAD, from_si, to_si
 
+WHOLE = board_map.registers()
 STOP_OF_LIMIT = 1.05  # of the current limit: a snapshot above ends the commissioning
 TRIPPED = 1 << 1  # of the register flags
 LEAST_OF_BUS = 0.1  # of the nominal bus voltage: below it no gain of the legs is formed
@@ -153,7 +156,12 @@ class Session:
     def _write(self, values: dict[str, int]) -> None:
         for name, value in values.items():
             if name not in ("position_restart", "omega_given"):  # the board's own
-                self.bus.write(name, value)
+                self._put(name, value)
+
+    def _put(self, name: str, value: int) -> None:
+        """Write it, but a still setting only where it changes: gains are loaded while the gates switch, too."""
+        if WHOLE[name].kind is not Kind.STILL or self.bus.read(name) != value:
+            self.bus.write(name, value)
 
     def set(self, **si: float) -> None:
         """References in SI units: i_d_ref, i_q_ext [A], omega_ref [electrical rad/s]."""
@@ -166,7 +174,7 @@ class Session:
         code = round(angle_rad / TURN_RAD / pairs * 2**forced_position.TURN_W) % 2**forced_position.TURN_W
         self.bus.write("forced_angle", code)
         self.bus.write("forced_rate", forced_position.setting(speed_rad_s / pairs, self.t_s))
-        self.bus.write("position_source", 1)
+        self._put("position_source", 1)
 
     def release(self) -> None:
         """The encoder's angle again."""

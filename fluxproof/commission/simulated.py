@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fluxproof.commission.bus import CODES, VALUES, checked
+from fluxproof.commission.bus import CODES, RUNNING, VALUES, checked
 from fluxproof.commission.simulated_loop import FIELDS, INPUTS, LAST_ANGLE, REFERENCED, Around, Memory, advance
 from fluxproof.cosim.driven_plant import bus_of, described_sensors
 from fluxproof.cosim.sensor_edges import edges_of
@@ -155,7 +155,7 @@ class SimulatedBus:
         return self._values[name]
 
     def write(self, name: str, value: int) -> None:
-        checked(self.board.registers, name, value)
+        checked(self.board.registers, name, value, lambda: bool(self.read("flags") & RUNNING))
         self._written = self._done
         if name == "clear_trip":
             self._memory.flags[1:] = 0

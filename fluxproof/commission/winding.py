@@ -50,7 +50,7 @@ PARKED_S = 0.5  # each of raising, holding and lowering the field that moves the
 STOOD_DEG = 25.0  # electrical, largest turn of the rotor in a run
 UNKNOWN_SWING = 60.0  # rad/s, without an inertia in the file
 MISFIT = 0.03  # of the voltages, rms; of an inductance, from which on its change with the current is told
-SURE = 3.0  # sigma, of that change
+SURE, LEADS = 3.0, 2.0  # sigma, of that change; of what the dead time's lead takes
 LARGEST_SIGMA = 0.03  # of R and L
 ORDERS = (1, -1, -5, 7, 5, -7, -11, 13)
 REPEATED = 2.0  # what the equation leaves is its own error rather than noise, and the run of the other sense repeats it
@@ -262,10 +262,11 @@ def judge(s: Session, points: list[Point]) -> Step:
         "inductance_q": Value(l_q, s_l_q, "H"),
         "v_dead": Value(v_dead, s_v, "V"),
     }
+    depends = _over_current(s, amplitudes, each, max(p.w for p in points))
     said = (
         f"R {r:.4g} +-{s_r:.1g} ohm, L_d {1e3 * l_d:.4g} +-{1e3 * s_l_d:.1g} mH, "
         f"L_q {1e3 * l_q:.4g} +-{1e3 * s_l_q:.1g} mH, "
-        f"V_dead {v_dead:.3g} +-{s_v:.1g} V, misfit {100 * fit.misfit:.2f} %{_over_current(s, amplitudes, each)}"
+        f"V_dead {v_dead:.3g} +-{s_v:.1g} V, misfit {100 * fit.misfit:.2f} %{depends}"
     )
     notes = {"misfit": fit.misfit, "swing_k": [fit.k, fit.s_k], "frequencies_hz": [p.w / TURN_RAD for p in points]}
     notes["lead_v_a"] = fit.lead
@@ -277,12 +278,18 @@ def judge(s: Session, points: list[Point]) -> Step:
     return Step("winding", quantities, said, notes)
 
 
-def _over_current(s: Session, amplitudes: list[float], each: Fit) -> str:
-    """The inductances that depend on the current, and up to which one they are known; empty if none does."""
+def _over_current(s: Session, amplitudes: list[float], each: Fit, w: float) -> str:
+    """The inductances that depend on the current, and up to which one they are known; empty if none does.
+
+    What the lead of the dead time takes at the smallest amplitude, V_dead*4/pi*i_0/(w*I**2) with i_0 = V_dead*T/L, may
+    be missed or taken twice: each amplitude but the largest has one frequency alone, which cannot tell the lead from an
+    inductance.
+    """
     said = []
+    leads = LEADS * 4.0 / math.pi * each.v_dead**2 * s.t_s / (w * amplitudes[0] ** 2)
     for name, values, sigmas in (("L_d", each.l_d, each.s_l_d), ("L_q", each.l_q, each.s_l_q)):
         change, error = values[-1] - values[0], math.hypot(sigmas[0], sigmas[-1])
-        if abs(change) > max(SURE * error, MISFIT * abs(values[0])):
+        if abs(change) > max(SURE * error, MISFIT * abs(values[0]), leads / abs(values[-1])):
             each_of = ", ".join(f"{1e3 * value:.4g}" for value in values)
             said.append(f"{name} {each_of} mH")
     if not said:

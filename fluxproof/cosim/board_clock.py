@@ -4,7 +4,8 @@
 The front ends' twins (golden_model/encoders, converters, io) and the clocked part of the core are wired as in
 rtl/generated/fluxproof_board.vhd: what an instance reads from another is what that had registered before the clock.
 Registers are written by name; a write on the bus takes effect ``BUS`` clocks after its address and data were first
-valid, a setting then waits for the end of the sample in flight (io/register_access.vhd).  The trip pin, which acts
+valid, a setting then waits for the end of the sample in flight, and a still one is refused while the gates switch
+(io/register_access.vhd).  The trip pin, which acts
 without a clock, changes between two clocks here; with a filter it is a pin like the others (io/power_stage.vhd).
 """
 
@@ -349,6 +350,9 @@ class BoardClock:
         self._due: list[Due] = []
         self._writes: list[tuple[int, str, int]] = []
         self._taken: list[tuple[int, str, int]] = []  # registers that change, and host_write with them
+        self._ran = 0  # whether the gates switched, a clock before the coming one
+        self._barred = False  # the write that waits is a still setting, and they did
+        self.refused: list[str] = []  # still settings that were written while they switched
 
     def write(self, name: str, value: int, at: int) -> None:
         """A write whose address and data are on the bus at clock ``at``; one at a time, in their order."""
@@ -368,6 +372,7 @@ class BoardClock:
             part = slice(at, at + length)
             inputs = rows_of(self.inputs, self._due, self.clock, length)
             self.state, made, entered, wires = self._run(inputs, pins[part], waits, seen[part], status[part])
+            self._ran = wires.running
             references = [self.registers.values[name] for name in REFERENCES]
             self.clock += made
             at += made
@@ -417,8 +422,15 @@ class BoardClock:
         """Accepts writes whose registers change at the coming clock; True where one waits for the end of a sample."""
         while self._writes and self._writes[0][0] <= self.clock:
             _, name, value = self._writes[0]
-            if self.registers.map[name].kind is Kind.SETTING and self.state.of_core.sample_busy:
+            kind = self.registers.map[name].kind
+            self._barred = kind is Kind.STILL and (self._barred or bool(self._ran))
+            if kind in (Kind.SETTING, Kind.STILL) and self.state.of_core.sample_busy:
                 return True
+            if self._barred:
+                self._barred = False
+                self.refused.append(name)
+                self._writes.pop(0)
+                continue
             self._taken += [(self.clock + 1, name, value), (self.clock + 1, HOST_WRITE, 1)]
             self._writes.pop(0)
         return False

@@ -172,7 +172,8 @@ def words(golden: BoardClock, shown: dict[str, int]) -> dict[str, int]:
     return {
         name: file.read(register.address)[1]
         for name, register in file.map.items()
-        if register.kind in (Kind.SETTING, Kind.COMMAND) or all(field.name in known for field in register.fields)
+        if register.kind in (Kind.SETTING, Kind.STILL, Kind.COMMAND)
+        or all(field.name in known for field in register.fields)
     }
 
 
@@ -202,7 +203,7 @@ def each_fault(drive: Drive, idle: int, rail: bool = False) -> list[tuple[dict[s
     """Each fault of the core that settings can make, alone not ignored; then made no longer, and cleared."""
     usual, most = board_registers(drive), {name: port.high for name, port in REGISTERS.items()}
     none = {"i_trip": 0, "sum_trip": 0, "u_dc_max": 0, "jump_max": 0, "omega_trip": 0}
-    stalled = {"omega_stall": most["omega_stall"], "stall_samples": 1, "i_max": 0, "speed_mode": 1}
+    stalled = {"way_stall": most["way_stall"], "stall_samples": 1, "i_max": 0, "speed_mode": 1}
     made = {
         "overcurrent": ("i_trip",),
         "current_sum": ("sum_trip",),

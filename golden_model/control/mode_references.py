@@ -106,13 +106,13 @@ def stimuli(rng, _config):
     for end in (PU.hi, PU.lo):
         for other in (PU.hi, PU.lo, 0):
             row = {f"u_{x}": end for x in "dq"} | {f"u_comp_{x}": other for x in "dq"}
-            row |= {"run": 1, "omega_step": 1}
+            row |= {"run": 1, "u_step": 1, "i_step": 1, "omega_step": 1}
             rows += [row | {f"u_dec_{x}": dec for x in "dq"} for dec in (0, PU.hi, PU.lo)]
     for by_voltage, regulates in ((1, 0), (0, 0), (0, 1), (1, 1)):
-        for most in (0, 1, 777, PU.hi):
+        for most in (1, 777, PU.hi):
             for start in (0, 12345, PU.hi, PU.lo):
                 base = {"u_d": start, "u_q": start, "torque_ref": start, "i_q_made": start, "i_d": start}
-                base |= {"u_step": most, "i_step": most, "omega_step": max(most, 1), "run": 1}
+                base |= {"u_step": most, "i_step": most, "omega_step": most, "run": 1}
                 for off in (-most - 1, -most, -most + 1, 0, most - 1, most, most + 1):
                     target = clamp(start + off, PU.lo, PU.hi)
                     aim = {"u_d_ext": target, "u_q_ext": -1 - target, "i_q_ext": target, "i_d_source": target}
@@ -147,8 +147,8 @@ Inputs = namedtuple("Inputs", [p.name for p in INPUTS])
 REGISTERS = (
     Port("u_d_ext", PU, doc="voltage of voltage mode, d axis"),
     Port("u_q_ext", PU, doc="voltage of voltage mode, q axis"),
-    Port("u_step", PU, lo=0, doc="largest change of a voltage of voltage mode per sample"),
-    Port("i_step", PU, lo=0, doc="largest change of a current reference per sample after a change of modes"),
+    Port("u_step", PU, lo=1, doc="largest change of a voltage of voltage mode per sample"),
+    Port("i_step", PU, lo=1, doc="largest change of a current reference per sample after a change of modes"),
     Port("omega_step", PU, lo=1, doc="largest change of the speed reference per sample after a change of modes"),
 )
 Registers = namedtuple("Registers", [p.name for p in REGISTERS])

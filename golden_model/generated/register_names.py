@@ -201,6 +201,7 @@ ADDRESSES = {
     "residual_leg": 0x378,
     "residual_light": 0x37C,
     "residual_slow": 0x380,
+    "way_stall": 0x384,
     "ring_arm": 0x3C0,
     "ring_stop": 0x3C4,
     "ring_faults": 0x3C8,

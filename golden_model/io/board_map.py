@@ -29,7 +29,7 @@ _GENERICS = {
 _COMMANDS = {
     "clear_encoder": (0x410, Kind.PULSE),
     "take_snapshot": (0x414, Kind.PULSE),
-    "position_source": (0x418, Kind.COMMAND),
+    "position_source": (0x418, Kind.STILL),
     "forced_angle": (0x41C, Kind.COMMAND),
     "forced_rate": (0x420, Kind.COMMAND),
     "board_ignore": (0x424, Kind.COMMAND),
@@ -55,6 +55,10 @@ _SETTINGS = """
     5c4 oversampling     5c8 sinc_gain      5cc start_clocks      5d0 trip_oversampling
     5d4 limit_high       5d8 limit_low      5dc master_counts    5e0 master_step      5e4 master_rest
 """
+STILL = (
+    "counts code_step master_counts master_step hall_reverse encoder_bits gray signed_code channel_a channel_b channel_c "
+    "channel_u_dc"
+).split()
 SETTINGS, STATUS = register_map._table(_SETTINGS), register_map._table(_STATUS)
 _LARGEST = {"k_edge": (1 << 31) - 1}  # a register fits a signed word; k_edge of real encoders is far below
 
@@ -81,11 +85,9 @@ def board_registers() -> list[Register]:
     ]
     for name, address in named.items():
         port = given[name]
-        reset = max(port.low, min(port.high, 0))
+        reset, kind = max(port.low, min(port.high, 0)), kinds.get(name, register_map.kind_of(name, STILL))
         needs = "master" if name.startswith("master_") else ""
-        found.append(
-            Register(name, address, kinds.get(name, Kind.SETTING), (Field(name, port),), port.doc, reset, needs)
-        )
+        found.append(Register(name, address, kind, (Field(name, port),), port.doc, reset, needs))
     found += [
         Register(name, address, Kind.STATUS, (Field(name, shown[name]),), shown[name].doc)
         for name, address in STATUS.items()

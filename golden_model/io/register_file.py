@@ -69,6 +69,8 @@ class RegisterFile:
         value = from_word(word)
         if not register.port.low <= value <= register.port.high:
             return SLVERR
+        if register.kind is Kind.STILL and self.status["running"]:
+            return SLVERR
         if not register.needs or self._built.get(register.needs, 0):
             self.values[register.name] = value
         return OKAY

@@ -8,6 +8,8 @@ Formats, ranges and meanings come from the ports of the blocks; nothing is decla
 Words have 32 bits; negative values are sign-extended.  When a write takes effect (``Kind``):
 
 * SETTING: between two samples, never during one; the bus response comes when the write takes effect.
+* STILL: likewise, and while the gates are off alone: what a quantity means to the controller, or how the gates switch.
+  A write while they switch is refused.
 * COMMAND, PULSE: at the next clock.  A pulse is set by ones and returns to zero after one clock.
 * SAMPLE_PULSE: between two samples; returns to zero after the next sample.
 * STATUS, CONSTANT, GENERIC: read only; a constant is fixed here, a generic when the core is built.
@@ -17,7 +19,7 @@ scripts/registers writes the SystemRDL from this map, and everything else from t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
@@ -54,6 +56,7 @@ class Kind(Enum):
     """The kind of a register, which decides when a write to it takes effect."""
 
     SETTING = "setting"
+    STILL = "still setting"
     COMMAND = "command"
     PULSE = "pulse"
     SAMPLE_PULSE = "sample pulse"
@@ -63,12 +66,12 @@ class Kind(Enum):
 
     @property
     def writable(self) -> bool:
-        return self in (Kind.SETTING, Kind.COMMAND, Kind.PULSE, Kind.SAMPLE_PULSE)
+        return self in (Kind.SETTING, Kind.STILL, Kind.COMMAND, Kind.PULSE, Kind.SAMPLE_PULSE)
 
     @property
     def waits(self) -> bool:
         """The write waits until no sample is in flight."""
-        return self in (Kind.SETTING, Kind.SAMPLE_PULSE)
+        return self in (Kind.SETTING, Kind.STILL, Kind.SAMPLE_PULSE)
 
 
 @dataclass(frozen=True)
@@ -122,6 +125,7 @@ _SETTINGS = """
     1d8 v_comp_max    1dc i_learn        1e0 eta_psi      1e4 omega_psi_min  1e8 k_ahead      1ec k_sign
     1f0 i_trip        1f4 sum_trip       1f8 u_dc_min     1fc u_dc_max
     200 omega_trip    204 omega_away     208 runaway_samples               20c omega_stall  210 stall_samples
+    384 way_stall
     214 i_open        218 offset_max     21c heartbeat    220 brake_on     224 brake_off
     228 emf_min       22c emf_i          230 emf_w        234 emf_samples    238 emf_l
     240 double_update
@@ -139,7 +143,12 @@ _SETTINGS = """
     350 residual_sum_max                 354 residual_sum_i
     378 residual_leg  37c residual_light
     380 residual_slow
-"""  # 24c, 278 to 27c, 2d8 to 2dc, 308 to 33c, 384 to 3bc and 3f0 to 3fc are free
+"""  # 24c, 278 to 27c, 2d8 to 2dc, 308 to 33c, 388 to 3bc and 3f0 to 3fc are free
+# What a code or a voltage means to the controller, and how the gates switch. What one trims while the drive runs (zeros
+# of the sensors, theta_offset), gains and limits are no such settings.
+STILL = (
+    "reverse pole_pairs k_speed two_sensors gain_a gain_b gain_c u_dc_gain k_u_max k_delay dead_time min_pulse"
+).split()
 _COMMANDS = {
     "enable": (0x040, Kind.COMMAND),
     "clear_trip": (0x044, Kind.PULSE),
@@ -228,6 +237,11 @@ def _table(text: str) -> dict[str, int]:
 SETTINGS, STATUS = _table(_SETTINGS), _table(_STATUS)
 
 
+def kind_of(name: str, still: Sequence[str] = STILL) -> Kind:
+    """The kind of a register of a block: SETTING, or STILL where it is one of these."""
+    return Kind.STILL if name in still else Kind.SETTING
+
+
 def inputs() -> dict[str, Port]:
     """The inputs of the core that are neither registers nor pins, by the name for software."""
     names = (
@@ -290,7 +304,7 @@ def _writable(settings: Mapping[str, Port]) -> list[Register]:
         if unknown := sorted(set(table) - set(ports)):
             raise ValueError(f"register map: {', '.join(unknown)} has an address, but is not a port of the core")
     found = [(name, address, kind, given[name]) for name, (address, kind) in _COMMANDS.items()]
-    found += [(name, SETTINGS[name], Kind.SETTING, port) for name, port in settings.items()]
+    found += [(name, SETTINGS[name], kind_of(name), port) for name, port in settings.items()]
     needs = fluxproof.NEEDS
     return [
         Register(

@@ -189,7 +189,8 @@ package fluxproof_pkg is
     omega_trip       : unsigned(LIMIT_W - 1 downto 0);  -- speed that trips, electrical
     omega_away       : unsigned(LIMIT_W - 1 downto 0);  -- speed against the reference from which a runaway is looked for
     runaway_samples  : unsigned(11 downto 0);  -- samples in sequence against the reference without braking that trip
-    stall_samples    : unsigned(15 downto 0);  -- samples in sequence at the current limit at rest that are a stall
+    way_stall        : unsigned(19 downto 0);  -- way to either side on which the shaft stalls: speed times samples
+    stall_samples    : unsigned(15 downto 0);  -- samples in sequence at the current limit on this way that are a stall
     emf_min          : unsigned(DUTY_W - 1 downto 0);  -- voltage that the EMF may be wrong by at rest without current
     emf_l            : unsigned(23 downto 0);  -- inductance over eight samples
     emf_i            : unsigned(22 downto 0);  -- the same for each current

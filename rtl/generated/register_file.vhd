@@ -203,6 +203,7 @@ begin
       data        => data,
       strobe      => strobe,
       sample_busy => sample_busy,
+      running     => running,
       arming      => arming,
       store       => store,
       answer      => answer,
@@ -804,6 +805,10 @@ begin
         settings.residual_slow <= signed(held(17 downto 0));
         written(224)           <= '1';
       end if;
+      if (row(28) and column(1) and not sample_busy) = '1' then
+        settings.way_stall <= unsigned(held(19 downto 0));
+        written(225)       <= '1';
+      end if;
       if (row(30) and column(0)) = '1' then
         ring_arm <= held(0);
       end if;
@@ -962,8 +967,8 @@ begin
         settings.voltage_mode     <= '0';
         settings.u_d_ext          <= (others => '0');
         settings.u_q_ext          <= (others => '0');
-        settings.u_step           <= (others => '0');
-        settings.i_step           <= (others => '0');
+        settings.u_step           <= to_signed(1, 18);
+        settings.i_step           <= to_signed(1, 18);
         settings.omega_step       <= to_signed(1, 18);
         settings.k_ripple         <= (others => '0');
         settings.gear_on          <= '0';
@@ -982,6 +987,7 @@ begin
         settings.residual_leg     <= (others => '0');
         settings.residual_light   <= (others => '0');
         settings.residual_slow    <= (others => '0');
+        settings.way_stall        <= to_unsigned(1, 20);
         ring_arm                  <= '0';
         ring_stop                 <= '0';
         ring_faults               <= (others => '0');
@@ -1183,7 +1189,9 @@ begin
   shown(74 to 98)   <= (others => (others => '0'));
   shown(99)         <= x"00000100";
   shown(100)        <= x"00001000";
-  shown(101 to 179) <= (others => (others => '0'));
+  shown(101 to 177) <= (others => (others => '0'));
+  shown(178)        <= x"00000001";
+  shown(179)        <= x"00000001";
   shown(180)        <= x"00000001";
   shown(181 to 183) <= (others => (others => '0'));
   shown(184)        <= "" & std_logic_vector(resize(observed.shaft_position, 32));
@@ -1201,7 +1209,9 @@ begin
   shown(219)        <= "" & std_logic_vector(resize(estimated.residual_sixth_q, 32));
   shown(220)        <= std_logic_vector(resize(estimated.residual_power, 32));
   shown(221)        <= std_logic_vector(resize(estimated.residual_sum, 32));
-  shown(222 to 239) <= (others => (others => '0'));
+  shown(222 to 224) <= (others => (others => '0'));
+  shown(225)        <= x"00000001";
+  shown(226 to 239) <= (others => (others => '0'));
   shown(240)        <= "0000000000000000000000000000000" & ring_arm;
   shown(241)        <= "0000000000000000000000000000000" & ring_stop;
   shown(242 to 247) <= (others => (others => '0'));

@@ -18,11 +18,12 @@ package register_map_pkg is
   constant REGISTER_LIMIT_W   : positive := 32;
   constant REGISTER_RANGE_W   : positive := 6;
 
-  -- Between: takes effect between two samples
-  constant REGISTER_NONE      : unsigned(1 downto 0) := "00";
-  constant REGISTER_READ_ONLY : unsigned(1 downto 0) := "01";
-  constant REGISTER_BETWEEN   : unsigned(1 downto 0) := "10";
-  constant REGISTER_AT_ONCE   : unsigned(1 downto 0) := "11";
+  -- Between: takes effect between two samples; still: likewise, while the gates are off alone
+  constant REGISTER_NONE      : unsigned(2 downto 0) := "000";
+  constant REGISTER_READ_ONLY : unsigned(2 downto 0) := "001";
+  constant REGISTER_BETWEEN   : unsigned(2 downto 0) := "010";
+  constant REGISTER_AT_ONCE   : unsigned(2 downto 0) := "011";
+  constant REGISTER_STILL     : unsigned(2 downto 0) := "110";
 
   function register_access_of (word : unsigned(REGISTER_WORD_W - 1 downto 0)) return unsigned;
   function register_range_of (word : unsigned(REGISTER_WORD_W - 1 downto 0)) return unsigned;
@@ -35,7 +36,7 @@ end package register_map_pkg;
 package body register_map_pkg is
 
   -- Tables instead of conditions: a multiplexer is faster than as many comparisons
-  type access_t is array (0 to 2**REGISTER_WORD_W - 1) of unsigned(1 downto 0);
+  type access_t is array (0 to 2**REGISTER_WORD_W - 1) of unsigned(2 downto 0);
   type range_t is array (0 to 2**REGISTER_WORD_W - 1) of unsigned(REGISTER_RANGE_W - 1 downto 0);
   type signed_t is array (0 to 2**REGISTER_WORD_W - 1) of std_logic;
   type low_t is array (0 to 2**REGISTER_RANGE_W - 1) of signed(REGISTER_LIMIT_W - 1 downto 0);
@@ -44,56 +45,58 @@ package body register_map_pkg is
   constant ACCESS_OF : access_t :=
   (
     0 to 12 | 32 to 48 | 50 to 59 | 184 to 186 | 214 to 221 | 248 to 251 | 256 to 259 | 272 to 282 | 284 to 293 | 576 to 587                                                                                                                    => REGISTER_READ_ONLY,
-    13 to 15 | 31 | 49 | 60 to 63 | 107 | 147 | 158 to 159 | 182 to 183 | 194 to 207 | 225 to 239 | 252 to 255 | 266 to 271 | 283 | 294 to 319 | 378 to 511 | 518 to 519 | 531 | 535 | 540 to 543 | 558 to 559 | 565 to 567 | 575 | 588 to 1023 => REGISTER_NONE,
-    16 to 17 | 19 | 26 to 27 | 240 to 247 | 260 to 265 | 512 to 517 | 520 to 530 | 532 to 534 | 536 to 539 | 544 to 557 | 560 to 564 | 568 to 574                                                                                               => REGISTER_AT_ONCE,
-    18 | 20 to 25 | 28 to 30 | 64 to 106 | 108 to 146 | 148 to 157 | 160 to 181 | 187 to 193 | 208 to 213 | 222 to 224 | 320 to 377                                                                                                             => REGISTER_BETWEEN
+    13 to 15 | 31 | 49 | 60 to 63 | 107 | 147 | 158 to 159 | 182 to 183 | 194 to 207 | 226 to 239 | 252 to 255 | 266 to 271 | 283 | 294 to 319 | 378 to 511 | 518 to 519 | 531 | 535 | 540 to 543 | 558 to 559 | 565 to 567 | 575 | 588 to 1023 => REGISTER_NONE,
+    16 to 17 | 19 | 26 to 27 | 240 to 247 | 260 to 261 | 263 to 265 | 512 to 517 | 520 to 530 | 532 to 534 | 536 to 539 | 544 to 557 | 560 to 564 | 568 to 574                                                                                  => REGISTER_AT_ONCE,
+    18 | 20 to 25 | 28 to 30 | 64 to 66 | 70 | 75 | 77 to 82 | 84 to 90 | 94 to 106 | 108 to 146 | 148 to 157 | 160 to 181 | 187 to 193 | 208 to 213 | 222 to 225 | 320 to 321 | 324 to 326 | 328 to 331 | 333 | 335 to 353 | 359 to 374 | 377  => REGISTER_BETWEEN,
+    67 to 69 | 71 to 74 | 76 | 83 | 91 to 93 | 262 | 322 to 323 | 327 | 332 | 334 | 354 to 358 | 375 to 376                                                                                                                                     => REGISTER_STILL
   );
 
   constant RANGE_OF : range_t :=
   (
-    0 to 15 | 31 to 63 | 107 | 147 | 158 to 159 | 161 | 170 to 171 | 182 to 186 | 194 to 207 | 214 to 221 | 225 to 239 | 248 to 259 | 266 to 319 | 378 to 511 | 518 to 519 | 531 | 535 | 540 to 543 | 558 to 559 | 565 to 567 | 575 to 1023 => to_unsigned(0, REGISTER_RANGE_W),
-    16 to 19 | 23 | 25 | 29 to 30 | 74 | 83 | 112 | 144 | 148 | 160 | 169 | 175 | 187 | 240 to 241 | 260 to 262 | 327 | 334 to 336 | 339 | 342 to 343 | 350 to 354 | 368 | 514 to 515 | 517 | 539 | 564                                     => to_unsigned(17, REGISTER_RANGE_W),
+    0 to 15 | 31 to 63 | 107 | 147 | 158 to 159 | 161 | 170 to 171 | 182 to 186 | 194 to 207 | 214 to 221 | 226 to 239 | 248 to 259 | 266 to 319 | 378 to 511 | 518 to 519 | 531 | 535 | 540 to 543 | 558 to 559 | 565 to 567 | 575 to 1023 => to_unsigned(0, REGISTER_RANGE_W),
+    16 to 19 | 23 | 25 | 29 to 30 | 74 | 83 | 112 | 144 | 148 | 160 | 169 | 175 | 187 | 240 to 241 | 260 to 262 | 327 | 334 to 336 | 339 | 342 to 343 | 350 to 354 | 368 | 514 to 515 | 517 | 539 | 564                                     => to_unsigned(18, REGISTER_RANGE_W),
     20 to 22 | 28 | 67 to 69 | 71 | 90 | 176 to 177 | 516 | 548 to 551                                                                                                                                                                      => to_unsigned(5, REGISTER_RANGE_W),
     24 | 109 to 111 | 188 | 568 to 569                                                                                                                                                                                                      => to_unsigned(6, REGISTER_RANGE_W),
-    26 to 27 | 243 | 265 | 344 | 346 | 530                                                                                                                                                                                                  => to_unsigned(23, REGISTER_RANGE_W),
-    64 to 66 | 70 | 95 | 102 | 105 | 132 | 135 | 145 | 150 | 152 | 163 | 247 | 337 | 348 to 349 | 365 | 371 | 373 to 374 | 555                                                                                                              => to_unsigned(30, REGISTER_RANGE_W),
-    72 | 82 | 91 | 98 | 101 | 103 to 104 | 106 | 115 to 122 | 138 | 143 | 154 | 156 to 157 | 164 | 174 | 178 to 179 | 181 | 208 | 222 to 224 | 242 | 323 | 370 | 376 | 520 | 533 | 557 | 573 to 574                                         => to_unsigned(32, REGISTER_RANGE_W),
+    26 to 27 | 243 | 265 | 344 | 346 | 530                                                                                                                                                                                                  => to_unsigned(24, REGISTER_RANGE_W),
+    64 to 66 | 70 | 95 | 102 | 105 | 132 | 135 | 145 | 150 | 152 | 163 | 247 | 337 | 348 to 349 | 365 | 371 | 373 to 374 | 555                                                                                                              => to_unsigned(31, REGISTER_RANGE_W),
+    72 | 82 | 91 | 98 | 101 | 103 to 104 | 106 | 115 to 122 | 138 | 143 | 154 | 156 to 157 | 164 | 174 | 181 | 208 | 222 to 224 | 242 | 323 | 370 | 376 | 520 | 533 | 557 | 573 to 574                                                      => to_unsigned(33, REGISTER_RANGE_W),
     73                                                                                                                                                                                                                                      => to_unsigned(8, REGISTER_RANGE_W),
-    75 | 193 | 212 | 263 | 324 | 328 to 329 | 340 | 377 | 562 to 563                                                                                                                                                                        => to_unsigned(33, REGISTER_RANGE_W),
-    76 | 80 to 81 | 84 to 89 | 97 | 108 | 123 | 140 | 142 | 149 | 151 | 153 | 162 | 172 to 173 | 209 to 210 | 523 to 525 | 536 to 538 | 570                                                                                                 => to_unsigned(40, REGISTER_RANGE_W),
-    77                                                                                                                                                                                                                                      => to_unsigned(31, REGISTER_RANGE_W),
-    78 | 347 | 367                                                                                                                                                                                                                          => to_unsigned(22, REGISTER_RANGE_W),
-    79 | 92 to 93 | 130 | 141 | 211 | 246 | 325 | 561                                                                                                                                                                                       => to_unsigned(29, REGISTER_RANGE_W),
-    94 | 113 | 330                                                                                                                                                                                                                          => to_unsigned(35, REGISTER_RANGE_W),
-    96 | 321 | 560                                                                                                                                                                                                                          => to_unsigned(18, REGISTER_RANGE_W),
-    99                                                                                                                                                                                                                                      => to_unsigned(15, REGISTER_RANGE_W),
-    100                                                                                                                                                                                                                                     => to_unsigned(16, REGISTER_RANGE_W),
-    114                                                                                                                                                                                                                                     => to_unsigned(36, REGISTER_RANGE_W),
-    124 to 129 | 131 | 133 | 136 to 137                                                                                                                                                                                                     => to_unsigned(27, REGISTER_RANGE_W),
-    134 | 146 | 191 | 320 | 331                                                                                                                                                                                                             => to_unsigned(28, REGISTER_RANGE_W),
-    139 | 534                                                                                                                                                                                                                               => to_unsigned(39, REGISTER_RANGE_W),
-    155 | 165 to 166 | 326                                                                                                                                                                                                                  => to_unsigned(42, REGISTER_RANGE_W),
-    167                                                                                                                                                                                                                                     => to_unsigned(19, REGISTER_RANGE_W),
-    168 | 355 to 358                                                                                                                                                                                                                        => to_unsigned(20, REGISTER_RANGE_W),
-    180                                                                                                                                                                                                                                     => to_unsigned(10, REGISTER_RANGE_W),
+    75 | 193 | 212 | 263 | 324 | 328 to 329 | 340 | 377 | 562 to 563                                                                                                                                                                        => to_unsigned(34, REGISTER_RANGE_W),
+    76 | 80 to 81 | 84 to 89 | 97 | 108 | 123 | 140 | 142 | 149 | 151 | 153 | 162 | 172 to 173 | 209 to 210 | 523 to 525 | 536 to 538 | 570                                                                                                 => to_unsigned(41, REGISTER_RANGE_W),
+    77                                                                                                                                                                                                                                      => to_unsigned(32, REGISTER_RANGE_W),
+    78 | 347 | 367                                                                                                                                                                                                                          => to_unsigned(23, REGISTER_RANGE_W),
+    79 | 92 to 93 | 130 | 141 | 211 | 246 | 325 | 561                                                                                                                                                                                       => to_unsigned(30, REGISTER_RANGE_W),
+    94 | 113 | 330                                                                                                                                                                                                                          => to_unsigned(36, REGISTER_RANGE_W),
+    96 | 321 | 560                                                                                                                                                                                                                          => to_unsigned(19, REGISTER_RANGE_W),
+    99                                                                                                                                                                                                                                      => to_unsigned(16, REGISTER_RANGE_W),
+    100                                                                                                                                                                                                                                     => to_unsigned(17, REGISTER_RANGE_W),
+    114                                                                                                                                                                                                                                     => to_unsigned(37, REGISTER_RANGE_W),
+    124 to 129 | 131 | 133 | 136 to 137                                                                                                                                                                                                     => to_unsigned(28, REGISTER_RANGE_W),
+    134 | 146 | 191 | 320 | 331                                                                                                                                                                                                             => to_unsigned(29, REGISTER_RANGE_W),
+    139 | 534                                                                                                                                                                                                                               => to_unsigned(40, REGISTER_RANGE_W),
+    155 | 165 to 166 | 326                                                                                                                                                                                                                  => to_unsigned(43, REGISTER_RANGE_W),
+    167                                                                                                                                                                                                                                     => to_unsigned(20, REGISTER_RANGE_W),
+    168 | 355 to 358                                                                                                                                                                                                                        => to_unsigned(21, REGISTER_RANGE_W),
+    178 to 180                                                                                                                                                                                                                              => to_unsigned(10, REGISTER_RANGE_W),
     189                                                                                                                                                                                                                                     => to_unsigned(9, REGISTER_RANGE_W),
-    190                                                                                                                                                                                                                                     => to_unsigned(11, REGISTER_RANGE_W),
-    192                                                                                                                                                                                                                                     => to_unsigned(21, REGISTER_RANGE_W),
-    213 | 521 to 522                                                                                                                                                                                                                        => to_unsigned(38, REGISTER_RANGE_W),
+    190                                                                                                                                                                                                                                     => to_unsigned(12, REGISTER_RANGE_W),
+    192                                                                                                                                                                                                                                     => to_unsigned(22, REGISTER_RANGE_W),
+    213 | 521 to 522                                                                                                                                                                                                                        => to_unsigned(39, REGISTER_RANGE_W),
+    225                                                                                                                                                                                                                                     => to_unsigned(11, REGISTER_RANGE_W),
     244 to 245                                                                                                                                                                                                                              => to_unsigned(4, REGISTER_RANGE_W),
     264                                                                                                                                                                                                                                     => to_unsigned(1, REGISTER_RANGE_W),
-    322 | 375                                                                                                                                                                                                                               => to_unsigned(34, REGISTER_RANGE_W),
-    332 to 333 | 338 | 345                                                                                                                                                                                                                  => to_unsigned(24, REGISTER_RANGE_W),
-    341 | 552 to 553                                                                                                                                                                                                                        => to_unsigned(26, REGISTER_RANGE_W),
+    322 | 375                                                                                                                                                                                                                               => to_unsigned(35, REGISTER_RANGE_W),
+    332 to 333 | 338 | 345                                                                                                                                                                                                                  => to_unsigned(25, REGISTER_RANGE_W),
+    341 | 552 to 553                                                                                                                                                                                                                        => to_unsigned(27, REGISTER_RANGE_W),
     359 to 360                                                                                                                                                                                                                              => to_unsigned(7, REGISTER_RANGE_W),
-    361 to 364                                                                                                                                                                                                                              => to_unsigned(25, REGISTER_RANGE_W),
-    366                                                                                                                                                                                                                                     => to_unsigned(12, REGISTER_RANGE_W),
-    369                                                                                                                                                                                                                                     => to_unsigned(14, REGISTER_RANGE_W),
-    372                                                                                                                                                                                                                                     => to_unsigned(13, REGISTER_RANGE_W),
+    361 to 364                                                                                                                                                                                                                              => to_unsigned(26, REGISTER_RANGE_W),
+    366                                                                                                                                                                                                                                     => to_unsigned(13, REGISTER_RANGE_W),
+    369                                                                                                                                                                                                                                     => to_unsigned(15, REGISTER_RANGE_W),
+    372                                                                                                                                                                                                                                     => to_unsigned(14, REGISTER_RANGE_W),
     512                                                                                                                                                                                                                                     => to_unsigned(3, REGISTER_RANGE_W),
     513 | 526 to 527 | 544 to 547                                                                                                                                                                                                           => to_unsigned(2, REGISTER_RANGE_W),
-    528 to 529 | 532 | 554 | 556                                                                                                                                                                                                            => to_unsigned(41, REGISTER_RANGE_W),
-    571 to 572                                                                                                                                                                                                                              => to_unsigned(37, REGISTER_RANGE_W)
+    528 to 529 | 532 | 554 | 556                                                                                                                                                                                                            => to_unsigned(42, REGISTER_RANGE_W),
+    571 to 572                                                                                                                                                                                                                              => to_unsigned(38, REGISTER_RANGE_W)
   );
 
   constant SIGNED_OF : signed_t :=
@@ -111,49 +114,49 @@ package body register_map_pkg is
     4        => to_signed(-262144, REGISTER_LIMIT_W),
     5        => to_signed(-131072, REGISTER_LIMIT_W),
     6        => to_signed(-32768, REGISTER_LIMIT_W),
-    7 to 11  => to_signed(1, REGISTER_LIMIT_W),
-    12       => to_signed(4, REGISTER_LIMIT_W),
-    13       => to_signed(8, REGISTER_LIMIT_W),
-    14       => to_signed(32, REGISTER_LIMIT_W),
-    15       => to_signed(256, REGISTER_LIMIT_W),
-    16       => to_signed(4096, REGISTER_LIMIT_W),
-    17 to 63 => to_signed(0, REGISTER_LIMIT_W)
+    7 to 12  => to_signed(1, REGISTER_LIMIT_W),
+    13       => to_signed(4, REGISTER_LIMIT_W),
+    14       => to_signed(8, REGISTER_LIMIT_W),
+    15       => to_signed(32, REGISTER_LIMIT_W),
+    16       => to_signed(256, REGISTER_LIMIT_W),
+    17       => to_signed(4096, REGISTER_LIMIT_W),
+    18 to 63 => to_signed(0, REGISTER_LIMIT_W)
   );
 
   constant HIGH_OF : high_t :=
   (
-    0 | 42      => to_signed(2147483647, REGISTER_LIMIT_W),
-    1 | 11 | 41 => to_signed(33554431, REGISTER_LIMIT_W),
-    2 | 40      => to_signed(16777215, REGISTER_LIMIT_W),
-    3 | 39      => to_signed(8388607, REGISTER_LIMIT_W),
-    4 | 33      => to_signed(262143, REGISTER_LIMIT_W),
-    5 | 10 | 32 => to_signed(131071, REGISTER_LIMIT_W),
+    0 | 43      => to_signed(2147483647, REGISTER_LIMIT_W),
+    1 | 12 | 42 => to_signed(33554431, REGISTER_LIMIT_W),
+    2 | 41      => to_signed(16777215, REGISTER_LIMIT_W),
+    3 | 40      => to_signed(8388607, REGISTER_LIMIT_W),
+    4 | 34      => to_signed(262143, REGISTER_LIMIT_W),
+    5 | 10 | 33 => to_signed(131071, REGISTER_LIMIT_W),
     6           => to_signed(32767, REGISTER_LIMIT_W),
     7           => to_signed(4, REGISTER_LIMIT_W),
-    8 | 24      => to_signed(63, REGISTER_LIMIT_W),
-    9 | 15 | 30 => to_signed(65535, REGISTER_LIMIT_W),
-    12 to 13    => to_signed(32, REGISTER_LIMIT_W),
-    14          => to_signed(256, REGISTER_LIMIT_W),
-    16          => to_signed(32768, REGISTER_LIMIT_W),
-    17          => to_signed(1, REGISTER_LIMIT_W),
-    18          => to_signed(3, REGISTER_LIMIT_W),
-    19          => to_signed(5, REGISTER_LIMIT_W),
-    20          => to_signed(7, REGISTER_LIMIT_W),
-    21          => to_signed(12, REGISTER_LIMIT_W),
-    22          => to_signed(15, REGISTER_LIMIT_W),
-    23          => to_signed(31, REGISTER_LIMIT_W),
-    25          => to_signed(127, REGISTER_LIMIT_W),
-    26          => to_signed(255, REGISTER_LIMIT_W),
-    27          => to_signed(511, REGISTER_LIMIT_W),
-    28          => to_signed(1023, REGISTER_LIMIT_W),
-    29          => to_signed(4095, REGISTER_LIMIT_W),
-    31          => to_signed(65536, REGISTER_LIMIT_W),
-    34          => to_signed(524287, REGISTER_LIMIT_W),
-    35          => to_signed(1048575, REGISTER_LIMIT_W),
-    36          => to_signed(1179647, REGISTER_LIMIT_W),
-    37          => to_signed(2097151, REGISTER_LIMIT_W),
-    38          => to_signed(4194303, REGISTER_LIMIT_W),
-    43 to 63    => to_signed(0, REGISTER_LIMIT_W)
+    8 | 25      => to_signed(63, REGISTER_LIMIT_W),
+    9 | 16 | 31 => to_signed(65535, REGISTER_LIMIT_W),
+    11 | 36     => to_signed(1048575, REGISTER_LIMIT_W),
+    13 to 14    => to_signed(32, REGISTER_LIMIT_W),
+    15          => to_signed(256, REGISTER_LIMIT_W),
+    17          => to_signed(32768, REGISTER_LIMIT_W),
+    18          => to_signed(1, REGISTER_LIMIT_W),
+    19          => to_signed(3, REGISTER_LIMIT_W),
+    20          => to_signed(5, REGISTER_LIMIT_W),
+    21          => to_signed(7, REGISTER_LIMIT_W),
+    22          => to_signed(12, REGISTER_LIMIT_W),
+    23          => to_signed(15, REGISTER_LIMIT_W),
+    24          => to_signed(31, REGISTER_LIMIT_W),
+    26          => to_signed(127, REGISTER_LIMIT_W),
+    27          => to_signed(255, REGISTER_LIMIT_W),
+    28          => to_signed(511, REGISTER_LIMIT_W),
+    29          => to_signed(1023, REGISTER_LIMIT_W),
+    30          => to_signed(4095, REGISTER_LIMIT_W),
+    32          => to_signed(65536, REGISTER_LIMIT_W),
+    35          => to_signed(524287, REGISTER_LIMIT_W),
+    37          => to_signed(1179647, REGISTER_LIMIT_W),
+    38          => to_signed(2097151, REGISTER_LIMIT_W),
+    39          => to_signed(4194303, REGISTER_LIMIT_W),
+    44 to 63    => to_signed(0, REGISTER_LIMIT_W)
   );
 
   function register_access_of (word : unsigned(REGISTER_WORD_W - 1 downto 0)) return unsigned is

@@ -107,7 +107,7 @@ begin
               omega_me => omega_me, omega_ref => omega_ref, speed_mode => speed_mode, speed_limited => speed_limited,
               regen_limited => regen_limited, run => run,
               omega_trip => settings.omega_trip, omega_away => settings.omega_away,
-              runaway_samples => settings.runaway_samples, omega_stall => settings.omega_stall,
+              runaway_samples => settings.runaway_samples, way_stall => settings.way_stall,
               stall_samples => settings.stall_samples,
               out_valid => motion_valid, motion_faults => motion_faults);
 

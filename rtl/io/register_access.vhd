@@ -3,11 +3,12 @@
 --
 --   allowed = the address has a register, it is writable, all strobes are set, low <= data <= high
 --   store   = write and allowed and (the register takes effect at once or no sample is in flight)
+--                   and (the gates are off or the register is no still setting)
 --
 -- A write that must wait for the end of a sample waits at most REGISTER_PATIENCE clocks: if samples follow each other
 -- without a gap, it ends in SLVERR instead of blocking the bus.  A read, a refusal and a write that takes effect at
 -- once never wait for a sample; but AXI4-Lite answers in order, so they wait behind a waiting write.
--- Answers: OKAY; to a write DECERR if no register has the address, SLVERR if it is not allowed or timed out.  A read of
+-- Answers: OKAY; to a write DECERR if no register has the address, SLVERR if it is not stored.  A read of
 -- such an address is answered by OKAY and zero, so that a dump of the window ends no process by a bus error.
 -- One comparator serves every register: its limits come from tables in register_map_pkg.
 -- Formats: data as signed 32 bits; no register reaches 2**31.  Latency: 5 clocks without waiting; store is valid in the
@@ -34,6 +35,7 @@ entity register_access is
     data        : in  std_logic_vector(31 downto 0);
     strobe      : in  std_logic_vector(3 downto 0);
     sample_busy : in  std_logic;  -- a sample is in flight: no value it uses may change at this edge
+    running     : in  std_logic;  -- the gates switch: no still setting changes two edges later
     arming      : out std_logic;  -- 1: store is possible in the next clock
     store       : out std_logic;  -- 1: the register is loaded at this edge
     answer      : out std_logic;
@@ -50,7 +52,7 @@ architecture rtl of register_access is
   signal word   : unsigned(WORD_BITS - 1 downto 0);
   signal number : signed(LIMIT_BITS - 1 downto 0);
 
-  type accesses_t is array (0 to 2**(WORD_BITS - 4) - 1) of unsigned(1 downto 0);
+  type accesses_t is array (0 to 2**(WORD_BITS - 4) - 1) of unsigned(2 downto 0);
   type ranges_t is array (0 to 2**(WORD_BITS - 4) - 1) of unsigned(REGISTER_RANGE_W - 1 downto 0);
 
   signal begun      : std_logic;
@@ -59,10 +61,11 @@ architecture rtl of register_access is
   signal ranges_1   : ranges_t;
   signal inside_1   : std_logic;
   signal fits_1     : std_logic;
-  signal access_2   : unsigned(1 downto 0);
+  signal access_2   : unsigned(2 downto 0);
   signal range_2    : unsigned(REGISTER_RANGE_W - 1 downto 0);
   signal writable_3 : std_logic;
   signal between_3  : std_logic;
+  signal still_3    : std_logic;
   signal low_3      : signed(LIMIT_BITS - 1 downto 0);
   signal high_3     : signed(LIMIT_BITS - 1 downto 0);
   signal over_4     : std_logic;
@@ -73,6 +76,8 @@ architecture rtl of register_access is
   signal patient_5  : std_logic;
   signal waits_5    : std_logic;
   signal granted_5  : std_logic;
+  signal barred     : std_logic;
+  signal barred_5   : std_logic;
   signal waited     : natural range 0 to REGISTER_PATIENCE + 1;
   signal may_stay   : std_logic;
   signal in_time    : std_logic;
@@ -90,7 +95,10 @@ begin
 
   allowed_4 <= valid(4) and writable_3 and not (over_4 or under_4);
   waits_5   <= patient_5 and sample_busy and in_time;
-  granted_5 <= armed_5 and in_time and not (between_3 and sample_busy);
+  granted_5 <= armed_5 and in_time and not (between_3 and sample_busy) and not barred_5;
+
+  -- A still setting is refused where the gates switched in the clock in which it was judged or in one of its waiting
+  barred <= (still_3 and running) or (barred_5 and patient_5);
 
   process (clk)
   begin
@@ -124,14 +132,18 @@ begin
       found      <= '0';
       writable_3 <= '0';
       between_3  <= '0';
+      still_3    <= '0';
       if access_2 /= REGISTER_NONE then
         found <= inside_1;
       end if;
-      if access_2 = REGISTER_BETWEEN or access_2 = REGISTER_AT_ONCE then
+      if access_2 = REGISTER_BETWEEN or access_2 = REGISTER_AT_ONCE or access_2 = REGISTER_STILL then
         writable_3 <= inside_1 and fits_1 and write;
       end if;
-      if access_2 = REGISTER_BETWEEN then
+      if access_2 = REGISTER_BETWEEN or access_2 = REGISTER_STILL then
         between_3 <= '1';
+      end if;
+      if access_2 = REGISTER_STILL then
+        still_3 <= '1';
       end if;
       low_3  <= resize(register_low_of(range_2), LIMIT_BITS);
       high_3 <= resize(register_high_of(range_2), LIMIT_BITS);
@@ -143,6 +155,7 @@ begin
       -- Stage 5: armed = allowed and not stored yet; patient if a sample may delay it
       armed_5   <= allowed_4 or waits_5;
       patient_5 <= (allowed_4 and between_3) or waits_5;
+      barred_5  <= barred;
 
       -- Clocks that a write has waited for the end of a sample
       waited <= 0;
@@ -158,6 +171,7 @@ begin
         judged_5  <= '0';
         armed_5   <= '0';
         patient_5 <= '0';
+        barred_5  <= '0';
         waited    <= 0;
         may_stay  <= '1';
         in_time   <= '1';
@@ -167,7 +181,7 @@ begin
 
   -- arming does not depend on sample_busy, which arrives late.  It therefore stays 1 for one clock after the store, in
   -- which the register is loaded with the same data or not at all; it is 0 in the clock that refuses the write
-  arming   <= allowed_4 or (patient_5 and may_stay and in_time);
+  arming   <= (allowed_4 or (patient_5 and may_stay and in_time)) and not barred;
   store    <= granted_5;
   answer   <= judged_5 and not waits_5;
   response <= OKAY when write = '0' else

@@ -39,10 +39,12 @@ property high { type = longint unsigned; component = field; };  // largest legal
 
 ABOUT = (
     "A register is one word of 32 bits; negative values are sign-extended. Kinds: "
-    "setting: takes effect between two samples, then the write is answered. command: takes effect at the next clock. "
+    "setting: takes effect between two samples, then the write is answered. still setting: likewise, while the gates "
+    "are off alone (running = 0). command: takes effect at the next clock. "
     "pulse: set by ones, zero again after one clock. sample pulse: set by a one, zero again after the next sample. "
     "status, constant, generic: read only. A write is a whole word, all four strobes set. SLVERR: value outside low to "
-    "high, read-only register, other strobes, or no gap between samples. DECERR: no register at the address of a "
+    "high, read-only register, other strobes, no gap between samples, or a still setting "
+    "while the gates switch. DECERR: no register at the address of a "
     "write; a read is OKAY and zero there. A write that is refused changes nothing. A register of a part that the core "
     "was built without keeps its reset value, and a legal write is OKAY. Values are per unit: 1.0 of a "
     "field's format is what its unit says. "

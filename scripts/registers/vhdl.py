@@ -28,7 +28,7 @@ GENERICS = {
     "GEARING": 0,
 }  # as in the core
 BOARD_GENERICS = {"ENCODER": 1, "CURRENTS": 1, "SPI_LINES": 4, "MASTER": 0}
-BETWEEN, AT_ONCE = ("setting", "sample pulse"), ("command", "pulse")
+BETWEEN, STILL, AT_ONCE = ("setting", "sample pulse"), ("still setting",), ("command", "pulse")
 BUS = (
     ("s_axi_awaddr", "in", 12),
     ("s_axi_awvalid", "in", 1),
@@ -60,7 +60,7 @@ def place(port: str) -> str:
 
 def writable(word: Word) -> bool:
     """Whether software can write the register."""
-    return word.kind in BETWEEN + AT_ONCE
+    return word.kind in BETWEEN + STILL + AT_ONCE
 
 
 def word_bits(words: list[Word]) -> int:
@@ -77,6 +77,7 @@ def package(words: list[Word]) -> str:
 
     def access(word: Word) -> str:
         names = {**dict.fromkeys(BETWEEN, "REGISTER_BETWEEN"), **dict.fromkeys(AT_ONCE, "REGISTER_AT_ONCE")}
+        names |= dict.fromkeys(STILL, "REGISTER_STILL")
         return names.get(word.kind, "REGISTER_READ_ONLY")
 
     stored, shown = [w for w in words if writable(w)], [w for w in words if w.kind == "status"]
@@ -99,7 +100,7 @@ def package(words: list[Word]) -> str:
     numbers, limits = "unsigned(REGISTER_RANGE_W - 1 downto 0)", "signed(REGISTER_LIMIT_W - 1 downto 0)"
     first = "to_unsigned(0, REGISTER_RANGE_W)"
     tables = [
-        ("access", *by_word, "unsigned(1 downto 0)", "unsigned", of_words(words, access, none)),
+        ("access", *by_word, "unsigned(2 downto 0)", "unsigned", of_words(words, access, none)),
         ("range", *by_word, numbers, "unsigned", of_words(stored, range_of, first)),
         ("signed", *by_word, "std_logic", "std_logic", signed),
         ("low", *by_range, limits, "signed", limits_of(0)),
@@ -239,7 +240,7 @@ def _gap(start: int, end: int) -> list[tuple[str, str]]:
 
 
 def _read(word: Word, sign: int) -> str:
-    if word.kind in ("constant", "setting", "command"):
+    if word.kind in ("constant", "setting", "still setting", "command"):
         return f'x"{word.reset:08X}"'
     if word.kind == "generic":
         return f"std_logic_vector(to_unsigned({word.name.upper()}, 32))"

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fluxproof.checkout import DRIVES
-from fluxproof.commission.bus import CODES, VALUES, checked
+from fluxproof.commission.bus import CODES, RUNNING, VALUES, checked
 from fluxproof.commission.simulated import board_of
 from fluxproof.commission.simulated_loop import INPUTS, LAST_ANGLE
 from fluxproof.commission.steps import commission
@@ -104,7 +104,7 @@ class HilBus:
         return self._values[name]
 
     def write(self, name: str, value: int) -> None:
-        checked(self.map, name, value)
+        checked(self.map, name, value, lambda: bool(self._values["enable"] and self.read("flags") & RUNNING))
         self._written = 1
         if name == "clear_trip":
             self._clear = 1

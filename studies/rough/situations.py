@@ -31,6 +31,7 @@ SPEEDS = (0.03, 0.1, 0.3, 0.8)
 ALLOWED_S = {0.03: 0.05, 0.1: 0.005, 0.3: 0.005, 0.8: 0.005}  # until a lost encoder is named
 HALL_ALLOWED_S = 0.1  # an edge tells the speed
 SILENT = 20  # periods without a write
+BACKWARD_ALLOWED_S = 0.6  # stall_s, and the way of the slowest speed regulator to the current limit
 UNSEEN_ALLOWED_S = 0.15  # the same where emf_check cannot see the EMF: stall_s, and the way to the current limit
 
 
@@ -184,6 +185,16 @@ def lost(how: Callable[[RoughBoard], None], names: tuple[str, ...]):
     return play
 
 
+def counts_backward(drive: Drive, part: float) -> tuple[str, bool]:
+    """An encoder that counts the wrong way, from rest: the field turns away from the rotor, which trembles."""
+    board = RoughBoard(drive, theta_m=BEFORE_INDEX)
+    reverse = 1 - board.set.values.reverse
+    board.run(LOADING, speed_mode=1, omega_ref=board.speed(part), reverse=reverse)
+    board.run(1, enable=1)
+    board.until_off(BACKWARD_ALLOWED_S)
+    return verdict(board, ("stall", "encoder_lost"), BACKWARD_ALLOWED_S, LOADING)
+
+
 def hall_levels(levels: tuple[int | None, ...], enabled: bool):
     """Levels of the three lines, None: as the sensor shows it; from before the enable on, or while it runs."""
 
@@ -239,6 +250,24 @@ def silent_host(drive: Drive, part: float) -> tuple[str, bool]:
     return seen, good and not early
 
 
+def written_at_speed(drive: Drive, part: float) -> tuple[str, bool]:
+    """Still settings far from theirs while the drive runs: refused, and it runs on; with the gates off one is taken."""
+    board = running(drive, part)
+    values = board.golden.registers.values
+    wrong = {"reverse": 1 - values["reverse"], "k_u_max": values["k_u_max"] // 2, "k_delay": 0, "gain_a": 0}
+    wrong |= {"pole_pairs": values["pole_pairs"] % 63 + 1, "dead_time": 1, "min_pulse": 2, "position_source": 1}
+    for name, value in wrong.items():
+        board.run(1, **{name: value})
+    board.run_s(0.01)
+    refused, ran = board.golden.refused[:], not board.faults and bool(board.golden.state.wires.running)
+    board.run(2, enable=0)
+    board.run(2, k_delay=0)
+    taken = values["k_delay"] == 0 and board.golden.refused == refused
+    return f"{len(refused)} of {len(wrong)} refused, {', '.join(board.faults) or 'no fault'}", (
+        refused == list(wrong) and ran and taken
+    )
+
+
 def scripted(make: Callable[[], FaultRun], names: frozenset[str]):
     """The script of fluxproof/cosim/fault_run.py, without a motor: all of these faults trip in their turn."""
 
@@ -272,6 +301,7 @@ TABLE = (
     Situation("A and B frozen", NAMED, EDGES, SPEEDS, lost(held, LOST)),
     Situation("all lines of A/B/Z dead", NAMED, EDGES, SPEEDS, lost(dead, LOST)),
     Situation("code frozen", NAMED, ABSOLUTE, SPEEDS, lost(held, LOST)),
+    Situation("counts the wrong way", "stall or encoder_lost in 0.6 s", ABSOLUTE, (0.3,), counts_backward),
     Situation("Hall sensors frozen", "encoder_lost in 100 ms", HALLS, (0.3, 0.8), lost(held, ("encoder_lost",))),
     Situation("Hall code 111 at the enable", "hall_code, gates never on", HALLS, (0.0,), hall_levels((1, 1, 1), False)),
     Situation("Hall code 000 at the enable", "hall_code, gates never on", HALLS, (0.0,), hall_levels((0, 0, 0), False)),
@@ -293,6 +323,7 @@ TABLE = (
         (0.0,),
         scripted(edges_run, frozenset(("index_wrong", "host_lost", "trip"))),
     ),
+    Situation("settings written that need the gates off", "refused, runs on", ALL, (0.6,), written_at_speed),
     Situation("the host is silent", "host_lost in the heartbeat's time", ALL, (0.3,), silent_host),
 )
 PASSES = {"enabled before the index": 2, "index dead, two turns by hand": 2, "Z stuck at 1, two turns by hand": 2,

@@ -167,7 +167,7 @@ async def a_setting_waits_for_the_sample(dut):
         held_up += [lead] * await written_around_a_sample(bench, MAP["kp_d"], 1000 + number, lead, SAMPLE_INTERVAL)
     assert held_up[0] > -EARLY
     # Each setting is held up by a gate of its own: in the clocks in which the write was under way as the sample came.
-    for register in (r for r in WRITABLE if r.kind is Kind.SETTING):
+    for register in (r for r in WRITABLE if r.kind in (Kind.SETTING, Kind.STILL)):
         for lead in held_up[:2]:
             low, high, now = register.port.low, register.port.high, bench.twin.values[register.name]
             assert await written_around_a_sample(bench, register, high if now == low else low, lead, 12)
@@ -246,6 +246,47 @@ async def the_last_clock_of_patience(dut):
             bench.check_outputs()
         assert await bench.fetch(register.address) == bench.twin.read(register.address), busy
     assert answers == sorted(answers) and {*answers} == {OKAY, SLVERR}
+
+
+@cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs
+async def a_still_setting_needs_the_gates_off(dut):
+    """Refused while they switch; where they begin or end in any clock of a write, waiting or not: stored and OKAY, or
+    neither.
+    """
+    bench = await Bench(dut, SEED).start()
+    still = [r for r in WRITABLE if r.kind is Kind.STILL]
+    bench.inputs["running"].value = bench.twin.status["running"] = 1
+    for register in (*still, MAP["theta_offset"], MAP["enable"]):
+        answer = await bench.write(register.address, register.port.high)
+        assert (
+            answer == bench.twin.write(register.address, register.port.high) == (SLVERR if register in still else OKAY)
+        )
+        assert await bench.fetch(register.address) == bench.twin.read(register.address), register.name
+    bench.check_outputs()
+    answers = []
+    for begins, busy, lead in itertools.product((1, 0), (0, 9), range(16)):
+        register = still[lead % len(still)]
+        value = bench.rng.randint(register.port.low, register.port.high)
+        bench.inputs["running"].value, dut.sample_busy.value = 1 - begins, int(busy > 0)
+        await ClockCycles(dut.clk, 3)
+        await FallingEdge(dut.clk)
+        writing = cocotb.start_soon(bench.write(register.address, to_word(value)))
+        for clock in range(24):
+            if clock == lead:
+                bench.inputs["running"].value = begins
+            if clock == busy:
+                dut.sample_busy.value = 0
+            await FallingEdge(dut.clk)
+        answers.append(await writing)
+        bench.twin.status["running"] = int(answers[-1] == SLVERR)
+        assert bench.twin.write(register.address, to_word(value)) == answers[-1]
+        for _ in range(3):
+            bench.check_outputs()
+            await FallingEdge(dut.clk)
+        bench.twin.status["running"] = begins
+        assert await bench.fetch(register.address) == bench.twin.read(register.address), register.name
+    late, early = answers[:16], answers[32:48]  # without a sample: refused where the gates switched early enough
+    assert late == sorted(late, reverse=True) and early == sorted(early) and {*late} == {*early} == {OKAY, SLVERR}
 
 
 @cocotb.test(timeout_time=500, timeout_unit="us")  # a bus that hangs

@@ -144,7 +144,7 @@ class Bench:
             if now != before and not rst:
                 for name in (n for n in now if now[n] != before[n]):
                     kind = MAP[name].kind
-                    assert not (busy and kind is Kind.SETTING), f"{name} changed inside a sample"
+                    assert not (busy and kind in (Kind.SETTING, Kind.STILL)), f"{name} changed inside a sample"
                     assert not (busy and kind is Kind.SAMPLE_PULSE and now[name]), f"{name} rose inside a sample"
             assert not (now["clear_trip"] and clear_trip_was), "clear_trip longer than a clock"
             if busy and not was_busy and taken:
