@@ -56,8 +56,8 @@ _SETTINGS = """
     5d4 limit_high       5d8 limit_low      5dc master_counts    5e0 master_step      5e4 master_rest
 """
 STILL = (
-    "counts code_step master_counts master_step hall_reverse encoder_bits gray signed_code channel_a channel_b channel_c "
-    "channel_u_dc"
+    "counts code_step master_counts master_step hall_reverse encoder_bits gray signed_code channel_a channel_b "
+    "channel_c channel_u_dc"
 ).split()
 SETTINGS, STATUS = register_map._table(_SETTINGS), register_map._table(_STATUS)
 _LARGEST = {"k_edge": (1 << 31) - 1}  # a register fits a signed word; k_edge of real encoders is far below
