@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from fluxproof.diagnosis.balance.slow_view import slow_view
 from fluxproof.diagnosis.catalogue import CATALOGUE
 from fluxproof.diagnosis.ground import constants
 from fluxproof.diagnosis.inference.fit import fit_set
-from fluxproof.diagnosis.inference.fitted_set import possible
+from fluxproof.diagnosis.inference.fitted_set import log_implausible, possible
 from fluxproof.diagnosis.inference.problem import Problem
 from fluxproof.diagnosis.inference.setup import Setup
 
@@ -44,3 +46,15 @@ def test_an_implausible_value_costs(share, costs, monkeypatch):
     priced = fit_set(problem, ("magnet_flux",)).value
     monkeypatch.setattr(constants, "IMPLAUSIBLE", 1.0)
     assert fit_set(problem, ("magnet_flux",)).value - priced == pytest.approx(np.log(1e3) * costs)
+
+
+def test_the_price_of_a_value_at_its_limit_has_no_edge():
+    """Beside an L_d of 3.3 +- 0.2 of the nameplate a gain of the bus, beside one of 3.5 a magnet flux, was found."""
+    view = slow_view(log(Truth(psi_m=0.45 * PSI), levels=LEVELS[:8]), NOMINAL)
+    fit = fit_set(Problem(Setup(view, view.visible(CATALOGUE), np.ones(len(view), bool))), ("magnet_flux",))
+    beyond = np.linspace(0.3, 4.0, 9)  # standard deviations
+    covariances = ((0.05 * PSI / z) ** 2 * np.ones_like(fit.cov) for z in beyond)
+    prices = [log_implausible(replace(fit, cov=covariance), fit.names) for covariance in covariances]
+    steps = -np.diff(prices)
+    assert prices[0] == pytest.approx(np.log(0.38), abs=0.1) and prices[-1] == pytest.approx(np.log(1e-3), abs=0.1)
+    assert np.all(steps > 0.0) and steps.max() < 1.6

@@ -10,9 +10,8 @@ import numpy as np
 
 from fluxproof.diagnosis.effects import Alternatives
 from fluxproof.diagnosis.effects.search import log_choice
-from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.inference.evidence import evidence
-from fluxproof.diagnosis.inference.fitted_set import FittedSet, implausible, log_too_small, possible
+from fluxproof.diagnosis.inference.fitted_set import FittedSet, log_implausible, log_too_small, possible
 from fluxproof.diagnosis.inference.model import Columns
 from fluxproof.diagnosis.inference.problem import Problem
 
@@ -33,7 +32,7 @@ def fit_set(problem: Problem, names) -> FittedSet:
         for n, x in zip(names, a, strict=True)
     )
     found = FittedSet(problem, names, float(value), take, c, cov, a, lam, mu)
-    judged = float(value) + np.log(k.IMPLAUSIBLE) * implausible(found) + log_too_small(found, names)
+    judged = float(value) + log_implausible(found, names) + log_too_small(found, names)
     return replace(found, value=judged)
 
 

@@ -26,7 +26,7 @@ from fluxproof.diagnosis.ground import constants as k
 from fluxproof.diagnosis.ground.machine import flux_terms
 from fluxproof.diagnosis.inference.evidence import evidence
 from fluxproof.diagnosis.inference.fit import fit_set
-from fluxproof.diagnosis.inference.fitted_set import implausible
+from fluxproof.diagnosis.inference.fitted_set import implausible, log_implausible
 from fluxproof.diagnosis.inference.linearise import Rows
 from fluxproof.diagnosis.inference.model import no_columns
 from fluxproof.diagnosis.inference.points import condense
@@ -113,7 +113,7 @@ def _of_any_nameplate(fit) -> float:
     effects, value = fit.problem.setup.effects, fit.value
     for name, size in zip(fit.names, fit.sizes, strict=True):
         if is_of_nameplate(effects[name]):
-            value += np.log1p(size**2 / fit.problem.most[name]) - np.log(k.IMPLAUSIBLE) * implausible(fit, name)
+            value += np.log1p(size**2 / fit.problem.most[name]) - log_implausible(fit, (name,))
     return float(value)
 
 
