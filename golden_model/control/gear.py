@@ -107,8 +107,10 @@ def stimuli(rng, _config):
         turn(30, 900, **slow)
         turn(3, 900, **slow, gear_free=1)
     odd = {"gear_numerator": 1, "gear_denominator": 1, "gear_step": 3}
-    for k in range(240):  # odd numerators in force: the rest passes every value of its lowest bits
+    for k in range(80):  # odd numerators in force: the rest passes every value of its lowest bits
         turn(1, 37, **odd, gear_on=k & 1)
+    for _ in range(20):  # errors of the mean speed's lowest bit add up until the longest lead shows them
+        turn(10, int(rng.integers(30, 9000)), gear_lead=1023, gear_smooth=8)
     for smooth in (0, 1, 5, 12):  # the lead, at its limit and away from it
         for lead in (0, 1, 530, 1023):
             turn(25, 70, gear_lead=lead, gear_smooth=smooth)
