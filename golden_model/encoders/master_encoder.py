@@ -118,6 +118,7 @@ BLOCK = Block(
     latency=1,
     clocked=True,
     configs=({"MASTER": 1}, {"MASTER": 0}),
+    too_wide=(1,),  # nothing is built, so there is nothing to draw
     reference=None,
     bound=None,
     stimuli=stimuli,
