@@ -108,8 +108,8 @@ def stimuli(rng, _config):
 
 
 def patient_stimuli(rng, _config):
-    """Both counters to their ends, the shorter by way of a limit at each of its bits, and the way likewise; a shaft
-    that brakes by an LSB.
+    """Both counters to their ends by way of limits between powers of two, and the way to one at each of its bits; a
+    shaft that brakes by an LSB.
     """
     rows = []
     for bit in range(PU.width - 1):  # the slowest speed so far with this bit and without
@@ -127,8 +127,9 @@ def patient_stimuli(rng, _config):
             row = USUAL | {"speed_limited": 1, "way_stall": limit}
             ends = (sign * rest - (sign > 0), sign, -sign, -sign * (PU.hi - rest))
             rows += [USUAL] + [row | {"omega_me": sign * PU.hi}] * whole + [row | {"omega_me": end} for end in ends] * 3
-    for most in (63, STALLED_HI):
-        row = {"omega_me": 10, "speed_limited": 1, "stall_samples": most}
+    between = (int(rng.integers(1 << bit - 1, 1 << bit)) for bit in range(7, 14))
+    for most in (63, *between, STALLED_HI):
+        row = {"omega_me": 0, "speed_limited": 1, "stall_samples": most}  # on the way for good
         rows += [USUAL] + [USUAL | row] * (most + 3)
     return rows
 
