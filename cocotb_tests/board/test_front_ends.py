@@ -40,7 +40,8 @@ def test_a_wrong_index_stops_the_drive_by_name():
 def test_a_forced_position_turns_and_the_encoder_is_read_beside_it():
     facts = run("forced")
     assert facts["steps"] == [RATE >> 16] and facts["fault_flags"] == 0
-    assert facts["board_flags"] == 1 << NAMES.index("no_index"), "told when the encoder's code is back, ignored here"
+    assert facts["board_flags"] == 0, "no index is missed with the gates off"
+    assert facts["refused"] > facts["snap_position"], "the source stays while the gates switch"
     assert facts["snap_ready"] == 1 and facts["forced"] == 0
     assert facts["snap_position"] > 0.05 * 2**16 and abs(facts["snap_code"] - facts["snap_position"]) > 100
     assert abs(facts["after"] - facts["snap_code"]) < 400, "the encoder's code is back"

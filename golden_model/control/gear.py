@@ -80,6 +80,39 @@ def step(state, inputs, regs):
     return following, (way, led, engaged, stopped)
 
 
+def _turns(x):
+    """Within the range of a position."""
+    return (x + 2.0**13) % 2.0**14 - 2.0**13
+
+
+def reference(v, state):
+    """The division without its rest, of which the sample before left some; the lead at the speed of the samples before."""
+    s, lsb, part = state, POSITION.lsb, 2.0**PART
+    delta = (v["gear_code"] - s.code * TURN.lsb + 0.5) % 1.0 - 0.5 if s.seen else 0.0
+    stopped = v["gear_on"] and (s.stopped or v["at_stop"])
+    acts = v["gear_on"] and not stopped and not v["gear_free"]
+    asked = v["gear_numerator"] if acts else 0.0
+    acting = s.acting / part + min(max(asked - s.acting / part, -v["gear_step"]), v["gear_step"])
+    acting = 0.0 if v["gear_free"] else acting
+    way = s.way * lsb + (s.rest * lsb / part + delta * acting) / v["gear_denominator"]
+    behind = _turns(way + v["gear_lead"] * s.speed * lsb / 2.0**SPEED_UP - s.led * lsb)
+    led = s.led * lsb + min(max(behind, -MOST * lsb), MOST * lsb)
+    engaged = acts and acting == asked and -MOST * lsb <= behind <= MOST * lsb
+    moves = 0.0 if v["gear_free"] else 1.0
+    return {
+        "gear_way": moves * _turns(way),
+        "led": moves * _turns(led),
+        "gear_engaged": float(bool(engaged)),
+        "gear_stopped": float(bool(stopped)),
+    }
+
+
+def bound(v, _state):
+    """The rest of the division; with it the floor of the speed, taken gear_lead times, and its rounding."""
+    lead = v["gear_lead"] * POSITION.lsb / 2.0**PART + POSITION.lsb / 2
+    return {"gear_way": POSITION.lsb, "led": POSITION.lsb + lead, "gear_engaged": 0.0, "gear_stopped": 0.0}
+
+
 def stimuli(rng, _config):
     """Masters of every speed in both directions, ratios, clutches at speed, ends of all counters, changed ratios."""
     rows, code = [], 0
@@ -167,7 +200,7 @@ BLOCK = Block(
         "X_W": X_W,
         "DIGITS": DIGITS,
     },
-    reference=None,
-    bound=None,
+    reference=reference,
+    bound=bound,
     stimuli=stimuli,
 )

@@ -52,7 +52,7 @@ def index_wrong() -> dict:
 
 
 def forced() -> dict:
-    """A current along a position that the host turns: no fault at the change of source; the snapshot has both."""
+    """A current along a position that the host turns; its source changes with the gates off; the snapshot has both."""
     drive = with_abz_and_spi(load(DRIVE), CARRIER_HALF)
     writes = {
         22: {"forced_angle": TURN.to_int(0.05), "forced_rate": RATE},
@@ -60,15 +60,24 @@ def forced() -> dict:
         25: {"enable": 1, "i_d_ref": PU.to_int(CURRENT_A / drive.bases.current_a)},
         60: {"take_snapshot": 1},
         61: {"board_ignore": 1 << NAMES.index("no_index")},
-        62: {"position_source": 0},
+        62: {"position_source": 0, "enable": 0},  # the gates switch still: refused
+        64: {"position_source": 0},
     }
-    loop, codes = BoardLoop(drive, writes), []
-    for chunk in loop.run(66):  # noqa: B007  # the last one counts
+    loop, codes, currents = BoardLoop(drive, writes), [], []
+    for chunk in loop.run(68):
         codes.append(loop.golden.state.wires.position_code)
+        if chunk.number == 61:
+            currents = [round(float(i), 2) for i in loop.plant.i_abc]
+        if chunk.number == 63:
+            refused = codes[-1]
     steps = np.diff(codes[30:60]) % (1 << 16)
     latch = loop.golden.state.of_core.of_fault_latch
-    currents = [round(float(i), 2) for i in loop.plant.i_abc]
-    facts = {"steps": sorted({int(s) for s in steps}), "fault_flags": latch.flags, "currents": currents}
+    facts = {
+        "refused": refused,
+        "steps": sorted({int(s) for s in steps}),
+        "fault_flags": latch.flags,
+        "currents": currents,
+    }
     return {**status(chunk), **facts, "after": codes[-1]}
 
 
