@@ -86,7 +86,7 @@ def _turns(x):
 
 
 def reference(v, state):
-    """The division without its rest, of which the sample before left some; the lead at the speed of the samples before."""
+    """The division without its rest; the lead at the mean speed of the samples before."""
     s, lsb, part = state, POSITION.lsb, 2.0**PART
     delta = (v["gear_code"] - s.code * TURN.lsb + 0.5) % 1.0 - 0.5 if s.seen else 0.0
     stopped = v["gear_on"] and (s.stopped or v["at_stop"])
