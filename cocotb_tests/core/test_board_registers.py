@@ -30,6 +30,9 @@ class Bus:
     def write(self, name, value):
         self.written[name] = value
 
+    def read(self, name):
+        return self.written.get(name)
+
     def now(self):
         return 0.0
 
