@@ -16,7 +16,7 @@ from fluxproof.diagnosis.inference.fit import fit_set
 from fluxproof.diagnosis.inference.model import BalanceRows, Columns, Prior
 from fluxproof.diagnosis.inference.points import Grouping, condense, repeated_dwells
 from fluxproof.diagnosis.inference.problem import Problem
-from fluxproof.diagnosis.inference.setup import Setup, is_driven, repeated
+from fluxproof.diagnosis.inference.setup import Setup, is_driven
 from fluxproof.diagnosis.physics import known_effects
 
 ROWS, NOISE = 60, 0.01
@@ -119,20 +119,6 @@ def test_a_load_that_drives_the_shaft_may_act_everywhere(torque, driven):
         view=SimpleNamespace(omega=np.array([[-10.0, -10.0], [20.0, 20.0], [30.0, 30.0]])),
     )  # fmt: skip
     assert is_driven(setup) is driven
-
-
-def test_what_a_settling_current_adds_is_no_noise():
-    """Noise may be all that differs between blocks of a point, but not where the current has no parabola."""
-    block = np.arange(8)
-    cells = SimpleNamespace(ok=np.ones(8, bool), block=block)
-    ripple = np.array([1.0, 0.01, -0.01, 0.02, 0.1, 0.101, 0.099, 0.1])
-
-    def kept(settles):
-        rows = SimpleNamespace(settles=settles)
-        return repeated(ripple, SimpleNamespace(cells=cells, repeats=block // 4, rows=rows))
-
-    assert kept(block < 0).tolist() == pytest.approx([0.0] * 4 + [0.1] * 4, rel=0.01)
-    assert kept(block == 0).tolist() == pytest.approx([1.0] + [0.0] * 3 + [0.1] * 4, rel=0.01)
 
 
 def test_a_swing_is_in_most_blocks():

@@ -15,7 +15,6 @@ import numpy as np
 from fluxproof.diagnosis.balance.cells import Cells, Projector, cells_of, columns_of, noise
 from fluxproof.diagnosis.balance.curves import parabola
 from fluxproof.diagnosis.balance.misfit import misfit
-from fluxproof.diagnosis.balance.settling import RINGS
 from fluxproof.diagnosis.balance.shaft import MEASURED
 from fluxproof.diagnosis.balance.view import View
 from fluxproof.diagnosis.effects import LegLoss, MeasurementError
@@ -46,8 +45,7 @@ class Rows:
         rough = Fitter(self.cells, np.ones(len(bends)), ~bends).unscored(everything(self.cells))
         # Both bound the noise: the misfit also has what differs between neighbours, the rough fit what it fits wrongly.
         self.noise = np.minimum(noise(view, self.cells, rough.residual), plain)
-        self.settles = settling_blocks(view)
-        self.smooth = view.kept_where(self.settles, smooth(view))
+        self.smooth = smooth(view)
         self.smooth_rows = self.projector.rows(misfit(self.smooth))
 
 
@@ -57,15 +55,6 @@ def smooth(view):
     u = parabola(view.u * np.conj(middle)) * middle
     i_abc = None if view.i_abc is None else view.phases(view.i)
     return view.replace(i_raw=view.stator(view.i), i_abc=i_abc, u=u)
-
-
-def settling_blocks(view):
-    """(b,) bool: blocks in which the current still settles, so that what no parabola follows is no noise.
-
-    Taken as noise, it was not corrected: of an angle that is off by half a turn it left a resistance of +4 %.
-    """
-    spread = np.std(view.i_raw - view.stator(view.i), axis=1)
-    return spread > RINGS * np.median(spread)
 
 
 @dataclass

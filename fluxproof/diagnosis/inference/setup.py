@@ -136,16 +136,11 @@ def _repeats(cells, points):
 
 
 def repeated(ripple, setup):
-    """(r,) the part of ripple rows that is no noise.
-
-    It repeats in all blocks of an operating point, and is shrunk by what noise may be; where a current still settles,
-    it is the whole ripple.
-    """
+    """(r,) the part of ripple rows that repeats in all blocks of an operating point, shrunk by what noise may be."""
     cells, cell = setup.cells, setup.repeats
-    settles = setup.rows.settles[cells.block]
-    w = np.where(cells.ok & ~settles, 1.0, 0.0)
+    w = np.where(cells.ok, 1.0, 0.0)
     count = np.maximum(np.bincount(cell, w), 1.0)
     mean = np.bincount(cell, w * ripple) / count
     spread = np.bincount(cell, w * (ripple - mean[cell]) ** 2) / np.maximum(count - 1.0, 1.0) / count
     kept = np.maximum(1.0 - k.RIPPLE * spread / np.maximum(mean**2, 1e-300), 0.0) * (count > 2)
-    return np.where(settles, ripple, (kept * mean)[cell])
+    return (kept * mean)[cell]
