@@ -67,7 +67,5 @@ def _hint(decision: Decision) -> list[str]:
         return []
     says = "; or ".join(r.says for r in decision.hinted)
     if decision.verdict in WHOLE:
-        return [
-            f"Or {says}: with fewer causes, that explains the misfit too, and this recording cannot separate them."
-        ]
+        return [f"Or {says}: with fewer causes, that explains the misfit too, and this recording cannot separate them."]
     return [f"The interpretation that {says} would fit better, but a large residual remains, so this is only a hint."]
