@@ -18,7 +18,7 @@ from golden_model.control.position_control import POSITION_W
 from golden_model.drive_keys import DriveError
 from golden_model.fixed import wrap_s
 from golden_model.formats import TURN_W
-from golden_model.kernel import CACHE_DIR, kernel
+from golden_model.kernel import kernel
 from golden_model.motion import Position, gear_delay, gear_ratio
 from golden_model.registers import registers
 from studies.position import figures
@@ -65,11 +65,14 @@ def test_way_and_rest_hold_all_that_the_master_turned():
 def test_ten_million_turns_leave_nothing():
     """The way after 10**7 turns of the master, and after all of them back, is the exact fraction of them."""
 
-    @kernel_here
+    @kernel
     def turned(state, code, samples, delta, regs):
         for _ in range(samples):
             code = (code + delta) & ((1 << TURN_W) - 1)
-            state, _ = gear.step(state, gear.Inputs(0, 0), regs._replace(gear_code=code))
+            now = gear.Registers(
+                code, 1, regs.gear_numerator, regs.gear_denominator, regs.gear_step, regs.gear_lead, regs.gear_smooth
+            )
+            state, _ = gear.step(state, gear.Inputs(0, 0), now)
         return state, code
 
     delta, turns = (1 << 16) - 1, 10**7
@@ -80,10 +83,6 @@ def test_ten_million_turns_leave_nothing():
     assert state.way == wrap_s(exact.numerator // exact.denominator, POSITION_W)
     state, code = turned(state, code, samples, -delta, ON._replace(gear_step=(1 << 25) - 1))
     assert code == 0 and state.way == 0 and state.rest == 0
-
-
-def kernel_here(function):
-    return kernel(function, CACHE_DIR.parent / "test_gearing")
 
 
 def test_the_reference_is_where_the_master_is():

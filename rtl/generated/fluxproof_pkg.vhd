@@ -465,7 +465,7 @@ package fluxproof_pkg is
   constant FLUX_LIMIT_DROP_REACH : natural := 17;
   constant FLUX_LIMIT_DIVIDEND_W : natural := 24;
 
-  -- gear: none: docs/position.md
+  -- gear: none: docs/gearing.md
   constant GEAR_LATENCY : positive := 42;
   constant GEAR_PART : natural := 9;
   constant GEAR_ACTING_W : natural := 25;

@@ -19,8 +19,7 @@ def given_of(registers, given, k):
     """What the speed of row ``k`` came from; ``given`` (n, 3) as fluxproof.Given, or of no row: the registers."""
     if k < len(given):
         return fluxproof.Given(given[k, 0], given[k, 1], given[k, 2], registers.emf_samples, registers.gear_code)
-    r = registers
-    return fluxproof.Given(r.speed_given, r.omega_given, r.position_restart, r.emf_samples, r.gear_code)
+    return fluxproof.given_by_registers(registers)
 
 
 @kernel
